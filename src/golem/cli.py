@@ -197,20 +197,6 @@ def _skill(words: list[str]) -> int:
     return run_skill(words)
 
 
-def _record(words: list[str]) -> int:
-    """Record a domain into a bag that ROS 2 tools and Foxglove read."""
-    from golem.runtime.live.record_commands import RecordConfig, run_record
-
-    return 0 if run_record(_parse(RecordConfig, "record", words)) else FAILED
-
-
-def _replay(words: list[str]) -> int:
-    """Play a bag onto a domain."""
-    from golem.runtime.live.record_commands import ReplayBagConfig, run_replay
-
-    return 0 if run_replay(_parse(ReplayBagConfig, "replay", words)) else FAILED
-
-
 def _check(words: list[str]) -> int:
     """Check modules against their contracts: `check`, `check SLOT [USE]`.
 
@@ -303,8 +289,9 @@ COMMANDS: dict[str, Callable[[list[str]], int]] = {
     "skill": _skill,
     "topics": _command("List what is on a domain, with rates and bytes.",
                        "golem.runtime.live.topic_stats", "TopicStatsConfig:run_topic_stats"),
-    "record": _record,
-    "replay": _replay,
+    "record": _command("Record a domain into a bag that ROS 2 tools and Foxglove read.",
+                       "golem.runtime.live.record_commands", "RecordConfig:run_record"),
+    "replay": _command("Play a bag onto a domain.", "golem.runtime.live.record_commands", "ReplayBagConfig:run_replay"),
     "black-box": _command("Show a stop of the safety gate at the moment of the fault.",
                           "golem.dashboard.stop_view", "StopViewConfig:run_stop_view"),
     "view": _command("Show a domain live in Foxglove.", "golem.runtime.live.foxglove_view", "ViewConfig:run_view"),

@@ -15,7 +15,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from golem.capabilities.identification import regressor as r
 from golem.capabilities.identification.recording import IdentificationError, Motion
-from golem.capabilities.identification.regressor import HangingTree, Sample
+from golem.capabilities.identification.regressor import HangingTree
 from golem.robots.model.limits import load_limits
 from golem.robots.model.table import JOINT_NAMES
 from golem.types import NUM_JOINTS, TICK, Array
@@ -108,8 +108,7 @@ def identify(motion: Motion, weight: float | None = None) -> Identified:
     dq, turn = np.gradient(q, TICK, axis=0), np.gradient(gyro, TICK, axis=0)
     ddq, spin, jerk = (np.gradient(values, TICK, axis=0) for values in (dq, turn, acc))
     rows = np.arange(250, len(q) - 250, STRIDE)  # without the filter's own beginning and end
-    columns = (values[rows] for values in (q, dq, ddq, gyro, turn, spin, acc, jerk))
-    samples = [Sample(*parts) for parts in zip(*columns, strict=True)]
+    samples = list(zip(*(values[rows] for values in (q, dq, ddq, gyro, turn, spin, acc, jerk)), strict=True))
     given, rubbing = low_passed(torque(motion, delay))[rows], low_passed(np.sign(dq))[rows]
     used = ~maximum_filter1d(np.abs(dq) < SLOW, 2 * AROUND + 1, axis=0)[rows]
     own = np.stack([ddq[rows], dq[rows], rubbing], axis=2)
@@ -119,7 +118,7 @@ def identify(motion: Motion, weight: float | None = None) -> Identified:
     common_at, data = np.r_[0:30, r.ZERO, r.BIAS, r.LAG], np.zeros_like(prior)
     for _ in range(ROUNDS):
         tree.load(x)
-        lines = [tree.linearise(x, sample) for sample in samples]
+        lines = [tree.linearise(x, *sample) for sample in samples]
         rigid, common = np.array([line[0] for line in lines]), np.array([line[1] for line in lines])
         data, pull = np.zeros_like(prior), -prior @ (x - r.NOMINAL)
         for j in range(NUM_JOINTS):

@@ -78,5 +78,5 @@ def read_motion(path: Path) -> Motion:
             f"{SHORTEST:g} s or more, as 'golem identify NEW_BAG --motion' records."
         )
     state = np.column_stack([np.interp(t[first:last], seen, column) for column in states[:, 1:].T])
-    parts = np.split(state, [n, 2 * n, 3 * n, 3 * n + 3], axis=1)
-    return Motion(*parts, commands[newest[first:last], 1:].reshape(-1, 5, n))
+    q, dq, tau, gyro, acc = np.split(state, [n, 2 * n, 3 * n, 3 * n + 3], axis=1)
+    return Motion(q, dq, tau, gyro, acc, commands[newest[first:last], 1:].reshape(-1, 5, n))

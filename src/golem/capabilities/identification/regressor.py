@@ -7,8 +7,6 @@ the encoders, bias and lag of the IMU enter by its derivatives (Carpentier, Mans
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 import pinocchio as pin
 
@@ -48,19 +46,6 @@ MASSES: Array = np.array([*(inertial.mass for inertial in LINKS.values()), 1.0, 
 """(30,) derivatives of the robot's mass by masses and payloads [kg]."""
 BARE = float(MASSES[MASS].sum()) + 2.0 * magpie_model.lump().mass
 """The model's mass, empty hands included [kg]."""
-
-
-class Sample(NamedTuple):
-    """One moment: q, dq, ddq (27,) [rad, s]; gyro, its two derivatives, acc, its derivative (3,) [rad, m, s]."""
-
-    q: Array
-    dq: Array
-    ddq: Array
-    gyro: Array
-    turn: Array
-    spin: Array
-    acc: Array
-    jerk: Array
 
 
 def payload(mass: float) -> Inertial:
@@ -105,20 +90,26 @@ class HangingTree:
         for name, inertial in links(x, loaded=True).items():
             self._model.inertias[self._place[name]] = pin.Inertia(inertial.mass, inertial.com, inertial.inertia)
 
-    def linearise(self, x: Array, s: Sample) -> tuple[Array, Array]:
+    def linearise(self, x: Array, *moment: Array) -> tuple[Array, Array]:
         """Return torques of the rigid links at `x`, which was loaded, and their derivatives.
+
+        Args:
+            x: (143,) parameters.
+            *moment: (27,) joints and their two derivatives; (3,) angular rate at the IMU and its two derivatives,
+                specific force there and its derivative [rad, m, s].
 
         Returns:
             torque: (27,) without armature and friction [N m].
             common: (27, 62) derivatives by masses, payloads, zeros, bias and lags.
         """
         q, v, a = np.zeros(self._model.nq), np.zeros(self._model.nv), np.zeros(self._model.nv)
-        gyro, turn = s.gyro + x[LAG][0] * s.turn, s.turn + x[LAG][0] * s.spin
-        acc = s.acc + x[LAG][1] * s.jerk - x[BIAS]
-        q[6], q[self._q] = 1.0, self._sign * (s.q - x[ZERO])
-        v[3:6], v[self._v] = gyro, self._sign * s.dq
+        place, speed, pull, gyro, turn, spin, acc, jerk = moment
+        gyro, turn = gyro + x[LAG][0] * turn, turn + x[LAG][0] * spin
+        acc = acc + x[LAG][1] * jerk - x[BIAS]
+        q[6], q[self._q] = 1.0, self._sign * (place - x[ZERO])
+        v[3:6], v[self._v] = gyro, self._sign * speed
         a[:3] = acc - np.cross(turn, IMU_AT) - np.cross(gyro, np.cross(gyro, IMU_AT))
-        a[3:6], a[self._v] = turn, self._sign * s.ddq
+        a[3:6], a[self._v] = turn, self._sign * pull
         # The hoist pulls at the pelvis: the waist is known by what is above it, which is what turns the root.
         at, sign = self._v.copy(), self._sign.copy()
         at[TORSO], sign[TORSO] = 5, 1.0
@@ -127,7 +118,7 @@ class HangingTree:
         turned, _, mass = pin.computeRNEADerivatives(self._model, self._data, q, v, a)
         zeros = -sign[:, None] * turned[np.ix_(at, self._v)] * self._sign
         bias = -sign[:, None] * mass[:3, at].T
-        lags = np.column_stack([sign * (mass[:6, at].T @ [*-np.cross(s.spin, IMU_AT), *s.spin]), -bias @ s.jerk])
+        lags = np.column_stack([sign * (mass[:6, at].T @ [*-np.cross(spin, IMU_AT), *spin]), -bias @ jerk])
         zeros[TORSO, : TORSO + 1] = bias[TORSO] = lags[TORSO] = 0.0
         torque = rows[:, MASS] @ (1.0 + x[MASS]) + rows[:, PAYLOAD] @ x[PAYLOAD] + rows[:, 30]
         return torque, np.hstack([rows[:, :30], zeros, bias, lags])

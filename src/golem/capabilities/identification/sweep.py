@@ -17,7 +17,7 @@ _ARM = ((0.0, 0.5), (0.6, 0.3), (0.0, 0.5), (1.1, 0.5), (0.0, 0.8), (0.0, 0.35),
 _MIRROR = (*(1,) * 6, -1, 1, -1, 1, 1, -1, *(1,) * 8, 1, -1, -1, 1, -1, 1, -1)
 MIDDLE, SWING = np.array([*_LEG, *_LEG, (0.0, 0.8), *_ARM, *_ARM]).T * [_MIRROR, (1,) * NUM_JOINTS]
 # Golden-ratio steps keep all pairs of frequencies apart [Hz]; the second sine tells friction from damping.
-_SLOW: Array = 0.16 + 0.2 * (np.arange(NUM_JOINTS) * 0.618034 % 1.0)
+_SLOW = 0.16 + 0.2 * (np.arange(NUM_JOINTS) * 0.618034 % 1.0)
 _GAINS = default_gains()
 EASE = 4.0
 """Time in which the swing grows [s]."""
