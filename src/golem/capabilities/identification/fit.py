@@ -110,7 +110,7 @@ def identify(motion: Motion, weight: float | None = None) -> Identified:
     rows = np.arange(250, len(q) - 250, STRIDE)  # without the filter's own beginning and end
     samples = list(zip(*(values[rows] for values in (q, dq, ddq, gyro, turn, spin, acc, jerk)), strict=True))
     given, rubbing = low_passed(torque(motion, delay))[rows], low_passed(np.sign(dq))[rows]
-    used = ~maximum_filter1d(np.abs(dq) < SLOW, 2 * AROUND + 1, axis=0)[rows]
+    used = maximum_filter1d(np.abs(dq) < SLOW, 2 * AROUND + 1, axis=0)[rows] == 0
     own = np.stack([ddq[rows], dq[rows], rubbing], axis=2)
 
     tree, x, noise, prior = HangingTree(), r.NOMINAL.copy(), np.ones(NUM_JOINTS), np.diag(1.0 / r.PRIOR**2)
