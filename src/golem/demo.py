@@ -304,7 +304,7 @@ def work_place(config: DemoConfig) -> Stack:
     """Return the stack, with its pack as the seed draws it."""
     stack = load_stack(config.stack, profile=config.profile)
     world = stack.choice("robot").options.get("world", "pack")
-    if config.layout == "nominal" or world != "pack":
+    if config.layout == "nominal" or world not in ("pack", "ioniq5"):
         return stack
     return stack.with_options("robot", layout=config.layout, conditions=dict(SHOWN))
 

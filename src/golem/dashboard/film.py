@@ -68,7 +68,7 @@ SAFETY_COLOURS = {
 def shots(robot: MujocoRobot) -> dict[str, Shot]:
     """Return the cameras that show `robot` at work: `wide` and `close`, which is on the tray's side."""
     found = STANDING if robot.config.support == "ground" else HANGING
-    if robot.config.world != "pack" or robot.scene.layout.tray_xy[1] < 0.0:
+    if robot.config.world not in ("pack", "ioniq5") or robot.scene.layout.tray_xy[1] < 0.0:
         return found
     close = found["close"]
     x, y, z = close.look_at

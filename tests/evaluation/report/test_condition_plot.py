@@ -8,7 +8,7 @@ import pytest
 from golem.evaluation.base import TrialSpec
 from golem.evaluation.report.condition_plot import PARTS, Placed, condition_plot, parts
 from golem.evaluation.report.svg_figure import page_figure, styled
-from golem.evaluation.rungs.pick_screw import conditions_of
+from golem.evaluation.rungs.pick_screw import PickOptions, conditions_of
 from golem.robots.worlds.conditions import CHOICES, RANGES
 
 
@@ -19,7 +19,7 @@ def spec(index: int) -> TrialSpec:
 @pytest.fixture
 def trials() -> list[Placed]:
     """Forty trials, of which those in the dark and those with brass screws are lost."""
-    places = [conditions_of("varied", spec(i)) for i in range(40)]
+    places = [conditions_of(PickOptions("varied"), spec(i)) for i in range(40)]
     return [(place, place.light > 0.4 and place.finish != "brass") for place in places]
 
 
@@ -40,7 +40,7 @@ def test_what_loses_shows(trials: list[Placed]) -> None:
 
 
 def test_a_trial_without_difference_is_one_part() -> None:
-    (part,) = [p for p in parts([(conditions_of("nominal", spec(0)), True)] * 5) if p.condition == "light"]
+    (part,) = [p for p in parts([(conditions_of(PickOptions(), spec(0)), True)] * 5) if p.condition == "light"]
     assert (part.name, part.won, part.n) == ("1 to 1", 5, 5)
 
 

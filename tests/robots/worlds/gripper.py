@@ -51,7 +51,7 @@ def build(draw: ScrewDraw) -> mujoco.MjModel:
         spec.add_material(name=name)
     plate = spec.worldbody.add_body(name="plate")
     screws.add_bore(plate, draw, (0, 0, 0))
-    screws.add_screw(spec, draw, (0, 0), np.eye(4))
+    screws.add_screw(spec, draw, (0, 0, 0), np.eye(4))
     height = draw.protrusion + draw.head_height / 2
     spec.worldbody.add_body(name="anchor", mocap=True, pos=[0, 0, height])
     hand = spec.worldbody.add_body(name="hand", pos=[0, 0, height], gravcomp=1)
@@ -91,7 +91,7 @@ def pull(draw: ScrewDraw, tilt: float, azimuth: float = 0.0) -> Pull:
     start = data.mocap_pos[0].copy()
     line = np.array([np.sin(tilt) * np.cos(azimuth), np.sin(tilt) * np.sin(azimuth), np.cos(tilt)])
     close, rise = 400, 2000
-    screw = model.body(screws.screw_name(0)).id
+    screw = model.body("screw_00").id
     hand = model.body("hand").id
     before = data.xpos[screw].copy()
     for k in range(close + rise + 300):

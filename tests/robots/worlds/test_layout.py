@@ -10,7 +10,7 @@ from golem.robots.worlds.layout import RIM_INSET, PackLayout
 def test_sixty_eight_fasteners_on_the_rim_one_pitch_apart() -> None:
     layout = PackLayout()
     spots = layout.fasteners()
-    assert spots.shape == (68, 2)
+    assert spots.shape == (68, 3) and not spots[:, 2].any()
     steps = np.linalg.norm(np.roll(spots, -1, axis=0) - spots, axis=1)
     assert steps.min() > 0.085 and steps.max() < 0.098
     to_edge = np.minimum.reduce([spots[:, 0], layout.size_x - spots[:, 0], layout.size_y / 2 - np.abs(spots[:, 1])])

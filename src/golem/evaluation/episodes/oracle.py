@@ -11,6 +11,7 @@ import numpy as np
 
 from golem.capabilities.perception.open_box import OpenBox
 from golem.evaluation.episodes.pick_claims import Fastener
+from golem.evaluation.episodes.whereabouts import whereabouts
 from golem.interfaces import topics
 from golem.middleware.bus import Bus
 from golem.robots.model import magpie_model
@@ -27,10 +28,6 @@ def place_error(bus: Bus, robot: MujocoRobot) -> float:
         return 0.0
     off = robot.truth.pose().to(place.T_odom_map.to(PlanarPose.of(believed.T_odom_base)))
     return math.hypot(off.x, off.y)
-
-
-OUT = 0.03
-"""A screw whose head is farther than this from its bore is out of it [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,16 +64,8 @@ class Oracle:
         self._rig: CameraRig | None = None
 
     def screws_in_tray(self) -> list[str]:
-        """Return the names of the screws that lie inside the tray's walls."""
-        layout = self._robot.scene.layout
-        half_x, half_y, height = 0.5 * layout.tray_size[0], 0.5 * layout.tray_size[1], layout.tray_size[2]
-        T_tray_world = np.linalg.inv(layout.tray_pose())
-        found = []
-        for name in self._robot.scene.names.screws:
-            x, y, z, _ = T_tray_world @ (*self._robot.data.body(name).xpos, 1.0)
-            if abs(x) <= half_x and abs(y) <= half_y and -0.01 <= z <= height:
-                found.append(name)
-        return found
+        """Return the names of the fasteners that lie inside the walls of a tray."""
+        return [f"{w.kind}_{w.slot:02d}" for w in whereabouts(self._robot) if w.where == "tray"]
 
     def fasteners(self) -> list[Fastener]:
         """Return the fasteners of the pack's near edge that are in their places before anything happens."""
@@ -87,15 +76,16 @@ class Oracle:
         found = []
         for slot in layout.reachable(0.5 * layout.size_y):
             if slot not in layout.empty_holes or slot in loose:
-                world = layout.pose() @ (*spots[slot], 0.0, 1.0)
-                found.append(Fastener((self._T_odom_world @ world)[:3], (T_base_world @ world)[:3], slot in loose))
+                world = layout.pose() @ (*spots[slot], 1.0)
+                found.append(
+                    Fastener((self._T_odom_world @ world)[:3], (T_base_world @ world)[:3], slot in loose, slot)
+                )
         return found
 
     def taken(self, fasteners: Sequence[Fastener]) -> set[int]:
         """Return which of `fasteners`, by their index, are loose and no longer in their bores."""
-        heads = self.screw_heads()
-        away = [np.linalg.norm(heads - f.position, axis=1).min() if len(heads) else np.inf for f in fasteners]
-        return {i for i, f in enumerate(fasteners) if f.loose and away[i] > OUT}
+        out = {w.slot for w in whereabouts(self._robot) if w.where != "seated"}
+        return {i for i, f in enumerate(fasteners) if f.slot in out}
 
     @property
     def T_world_odom(self) -> Array:

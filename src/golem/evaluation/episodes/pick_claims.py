@@ -26,11 +26,13 @@ class Fastener:
         position: (3,) of its bore's mouth in odom [m].
         in_base: (3,) the same in base_link [m].
         loose: whether it was loosened.
+        slot: its place in the layout.
     """
 
     position: Array
     in_base: Array
     loose: bool
+    slot: int = -1
 
 
 REFUSALS = (

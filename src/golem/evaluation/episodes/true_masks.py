@@ -103,7 +103,7 @@ class TrueMasks:
         scene, data = self._robot.scene, self._data
         holes = [(p.position, 0.5 * float(p.size[0])) for p in scene.names.parts if p.label == "screw_hole"]
         for name, mouth, draw in zip(scene.names.screws, scene.names.mouths, scene.draws, strict=True):
-            if np.linalg.norm(data.body(name).xpos - mouth) > AWAY:
+            if draw.kind != "nut" and np.linalg.norm(data.body(name).xpos - mouth) > AWAY:
                 holes.append((mouth, draw.bore_radius))
         return holes
 

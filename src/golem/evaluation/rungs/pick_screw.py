@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cache, lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -36,6 +36,7 @@ from golem.provenance import stack_facts
 from golem.robots.mujoco.balance import TRACE, BalanceRecorder, BalanceTrace
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.mujoco.gl import shared_context
+from golem.robots.mujoco.scene import ranges_of
 from golem.robots.worlds.conditions import Conditions, LayoutKind, draw_conditions, world_stream
 from golem.runtime.executor import when_stepped
 from golem.runtime.lockstep import LockstepRunner
@@ -197,13 +198,18 @@ class PickOptions:
     layout: LayoutKind = "nominal"
     """nominal: pack and tray always stand at the same place. varied: drawn from the trial's seed, as is what it looks
     like and what lies about."""
+    world: Literal["pack", "ioniq5"] = "pack"
+    """pack: 68 screws at even pitch. ioniq5: the 84 fasteners of a real pack, its rim at 0.857 m plus `height`."""
+    label: Literal["screw", "nut"] = "screw"
+    """What is picked."""
     sweep: str = ""
     """A condition whose values are tried one by one: NAME=FROM..TO, NAME=FROM..TO:COUNT or NAME=VALUE,VALUE."""
 
 
-def conditions_of(layout: LayoutKind, spec: TrialSpec) -> Conditions:
+def conditions_of(options: PickOptions, spec: TrialSpec) -> Conditions:
     """Return the conditions of a trial's work place."""
-    return draw_conditions(layout, spec.case, world_stream(episode_seed(spec.seed, spec.index)))
+    rng = world_stream(episode_seed(spec.seed, spec.index))
+    return draw_conditions(options.layout, spec.case, rng, ranges_of(options.world))
 
 
 def let_go(running: LockstepRunner, robot: MujocoRobot) -> TrialOutcome | None:
@@ -255,6 +261,8 @@ class PickRung(Rung[PickOptions]):
         stack = self._stack(spec.method, spec.profile, spec.overrides)
         if self.options.layout != "nominal" or spec.case:
             stack = stack.with_options("robot", layout=self.options.layout, conditions=dict(spec.case))
+        if self.options.world != "pack":
+            stack = stack.with_options("robot", world=self.options.world)
         running, robot = build_seeing(stack, spec)
         if self.onlooker is not None:
             self.onlooker(running, robot)
@@ -290,7 +298,7 @@ class PickRung(Rung[PickOptions]):
         if self.options.layout == "nominal" or self.options.sweep:
             return None
         placed = {
-            method: [(conditions_of(self.options.layout, spec), outcome.success) for spec, outcome in rows]
+            method: [(conditions_of(self.options, spec), outcome.success) for spec, outcome in rows]
             for method, rows in outcomes.items()
         }
         condition_plot(placed, figure)
@@ -300,7 +308,7 @@ class PickRung(Rung[PickOptions]):
     def _goal(self) -> PickGoal:
         """Either hand, but at the nominal place, whose tray is on the right."""
         nominal = self.options.layout == "nominal" and not self.options.sweep
-        return PickGoal() if nominal else PickGoal(side="either")
+        return PickGoal(self.options.label, side="right" if nominal else "either")
 
     @property
     def balances(self) -> bool:

@@ -59,6 +59,10 @@ NOWHERE_TO_WORK = (PickOutcome.OUT_OF_REACH, PickOutcome.TRAY_MISSING, PickOutco
 """What a pick says of a robot that stands where it cannot work."""
 
 
+PLANT = {"pack": "plant", "ioniq5": "ioniq5_plant"}
+"""Where a robot walks to a pack."""
+
+
 @dataclass(frozen=True)
 class VarStandOptions(PickOptions):
     """The work place, and how the robot comes to it."""
@@ -120,7 +124,7 @@ class VarStandRung(PickRung):
             layout=self.options.layout,
             conditions=conditions,
             stance=[stance.x, stance.y, stance.yaw],
-            world="plant" if walks else "pack",
+            world=PLANT[self.options.world] if walks else self.options.world,
             obstacles=self.options.obstacles if walks else 0,
         )
         with TemporaryDirectory() as folder:
@@ -130,7 +134,7 @@ class VarStandRung(PickRung):
                 guess = (spec.rng("guess").uniform(-1.0, 1.0, 3) * GUESS).tolist()
                 stack = stack.with_options("mapper", file=f"{folder}/hall.yaml", guess=guess)
             with closing(Episode(stack, seed, self.onlooker)) as episode:
-                trial = _Trial(spec, stack, episode, stance)
+                trial = _Trial(spec, stack, episode, stance, self.options.label)
                 outcome = trial.run()
                 if artefacts is not None and trial.recorder is not None:
                     trial.recorder.trace().save(artefacts / TRACE)
@@ -160,8 +164,9 @@ class _Trial:
         recorder: of the balance from the pick on; None before it.
     """
 
-    def __init__(self, spec: TrialSpec, stack: Stack, episode: Episode, stance: PlanarPose) -> None:
+    def __init__(self, spec: TrialSpec, stack: Stack, episode: Episode, stance: PlanarPose, label: str) -> None:
         self._spec, self._stack, self._episode, self._stance = spec, stack, episode, stance
+        self._label = label
         self._docks = 3 if spec.case["dock"] == "yes" else 0
         self._oracle = Oracle(episode.robot)
         self._contacts = ContactWatch(episode.robot)
@@ -213,7 +218,7 @@ class _Trial:
         touches = PickTouches(robot, before, oracle.T_world_odom)
         self.recorder = BalanceRecorder(robot)
         watch = PickWatch(running, oracle, self.recorder, touches)
-        goal = DisassembleGoal(1, self._docks, pick=PickGoal(side="either"))
+        goal = DisassembleGoal(1, self._docks, pick=PickGoal(self._label, side="either"))
         news, since = News(running.bus, topics.FEEDBACK), running.executor.t
 
         def look() -> None:

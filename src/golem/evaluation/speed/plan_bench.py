@@ -122,7 +122,7 @@ def _box(T_world: Array, at: tuple[float, ...], half: tuple[float, ...], name: s
 def _above_screw(layout: PackLayout, side: Side, rng: np.random.Generator) -> Array:
     slots = layout.reachable()
     spot = layout.fasteners()[slots[int(rng.integers(len(slots)))]]
-    x, y, z, _ = layout.pose() @ (*spot, 0.0, 1.0)
+    x, y, z, _ = layout.pose() @ (*spot, 1.0)
     return downward(float(x), float(y), float(z) - PELVIS + float(rng.uniform(0.04, 0.16)), YAW[side])
 
 

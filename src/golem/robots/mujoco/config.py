@@ -13,8 +13,15 @@ from golem.robots.mujoco.hoist import HoistConfig
 from golem.robots.worlds.conditions import LayoutKind, check_condition
 
 Support = Literal["hoist", "ground"]
-World = Literal["pack", "plant", "open", "slope", "step", "rubble", "furnished", "corridor", "kitchen", "counter"]
-WITH_PACK = ("pack", "plant")
+World = Literal[
+    "pack", "ioniq5", "plant", "ioniq5_plant",
+    "open", "slope", "step", "rubble", "furnished", "corridor", "kitchen", "counter",
+]  # fmt: skip
+IONIQ5 = ("ioniq5", "ioniq5_plant")
+"""Worlds with the real pack."""
+PLANTS = ("plant", "ioniq5_plant")
+"""Worlds with a pack in a furnished hall."""
+WITH_PACK = ("pack", *PLANTS, "ioniq5")
 """Worlds with a pack to work on."""
 KITCHENS = ("kitchen", "counter")
 """Worlds with a fridge and a counter."""
@@ -32,7 +39,8 @@ class MujocoConfig:
             in each. `furnished`: a hall with walls, shelves, pillars, gantry and packs, drawn from the seed; `plant`:
             that hall with the pack to work on; `corridor`: two bare walls; `kitchen`: a fridge before the robot and a
             counter with tableware beside it; `counter`: that kitchen with the counter before the robot, four things
-            within reach.
+            within reach. `ioniq5` and `ioniq5_plant`: as `pack` and `plant`, with the fasteners of a real pack, its rim
+            0.857 m over the floor on which the robot would stand.
         arms: where they are when the world begins: at home, or hanging as they do while the motors are limp.
         stance: where the robot should stand before pack or counter, from where it begins: x, y [m] and yaw [rad], which
             is 0 in a kitchen.
@@ -44,7 +52,7 @@ class MujocoConfig:
         conditions: those of `worlds.conditions` that are not left to the layout, e.g. `{light: 0.3}`.
         hoist: how the robot is held.
         reach_y: near-edge fasteners with |y| up to this are loosened [m]; a varied layout draws among those up to
-            `REACH_Y`.
+            `REACH_Y`. Of an ioniq5 those all round.
         torque_profile: torque limits of the simulated motors (see `robots.model.limits`).
         near: distance of a finger from a screw below which physics runs at the fine step [m].
         slope: inclination of the ramp [rad].

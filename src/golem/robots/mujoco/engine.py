@@ -23,7 +23,7 @@ from golem.robots.mujoco.hand_servos import HandServos
 from golem.robots.mujoco.hoist import Hoist
 from golem.robots.mujoco.lidar_sensor import LidarMoment, LidarSensor
 from golem.robots.mujoco.motors import Motors
-from golem.robots.mujoco.scene import COARSE_STEP, FINE_STEP, Scene, build_scene
+from golem.robots.mujoco.scene import COARSE_STEP, FINE_STEP, Scene, build_scene, nominal_layout
 from golem.robots.mujoco.truth import Truth
 from golem.robots.mujoco.twin_stages import (
     TWIN,
@@ -42,7 +42,6 @@ from golem.robots.sensors.mid360 import IMU_PERIOD
 from golem.robots.sensors.profiles import load_profile, sample_episode
 from golem.robots.sensors.streams import stream
 from golem.robots.worlds.dressing import mirror_geoms
-from golem.robots.worlds.layout import PackLayout
 from golem.types import LEGS, SIDES, UPPER, Array, HandCommand, HandState, Imu, LowCommand, Side
 
 START_GAP = 0.060
@@ -79,10 +78,9 @@ class MujocoRobot:
         self.config = config or MujocoConfig()
         self.profile = load_profile(profile)
         self.cameras = CAMERAS
-        hoist, layout = self.config.hoist, PackLayout()
+        hoist, standing = self.config.hoist, standing_height(posture)
+        layout = nominal_layout(self.config, standing)
         if self.config.support == "ground":
-            standing = standing_height(posture)
-            layout = layout.raised(standing - hoist.height)
             hoist = replace(hoist, height=standing)
         self.scene: Scene = build_scene(self.config, layout, self.profile, seed)
         model = self.scene.model
@@ -101,7 +99,7 @@ class MujocoRobot:
             name: AutoExposure(conditions.light, stream(seed, f"exposure/{name}"), self.profile.colour_noise)
             for name in CAMERAS
         }
-        self._mirrors = mirror_geoms(model, conditions) if self.config.world == "pack" else None
+        self._mirrors = mirror_geoms(model, conditions) if self.config.world in ("pack", "ioniq5") else None
         self._memory = memory = new_record(TWIN)
         noise = stream(seed, "imu")
         self._imu_model = ImuModel(self.profile.imu, self._errors.imu, noise, memory["imu"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -12,16 +13,25 @@ from golem.errors import ConfigError
 from golem.robots.model import contact_shapes, magpie_model, mjcf
 from golem.robots.model.looks import VISUAL_GROUP
 from golem.robots.model.table import BASE_LINK, JOINT_NAMES
-from golem.robots.mujoco.config import KITCHENS, WITH_PACK, MujocoConfig
+from golem.robots.mujoco.config import IONIQ5, KITCHENS, PLANTS, WITH_PACK, MujocoConfig
 from golem.robots.mujoco.tag_plates import add_tag_cuffs
 from golem.robots.sensors.profiles import RealismProfile
 from golem.robots.sensors.streams import stream
 from golem.robots.worlds import furnished, terrain
 from golem.robots.worlds.clutter import add_clutter
-from golem.robots.worlds.conditions import REACH_Y, Conditions, arranged, draw_conditions, draw_fasteners, world_stream
+from golem.robots.worlds.conditions import (
+    RANGES,
+    REACH_Y,
+    Conditions,
+    arranged,
+    draw_conditions,
+    draw_fasteners,
+    world_stream,
+)
 from golem.robots.worlds.dressing import dress
 from golem.robots.worlds.fridge import Seal, seal_of
 from golem.robots.worlds.furnished import Person
+from golem.robots.worlds.ioniq5 import IONIQ5_RANGES, Ioniq5Layout
 from golem.robots.worlds.kitchen import KitchenLayout, add_kitchen, draw_counter, draw_kitchen, mirrored
 from golem.robots.worlds.layout import PackLayout
 from golem.robots.worlds.pack import PackNames, add_pack
@@ -73,6 +83,25 @@ class Scene:
             data.mocap_pos[self.model.body(person.name).mocapid[0]] = person.position(data.time)
 
 
+def nominal_layout(config: MujocoConfig, standing: float) -> PackLayout:
+    """Return where pack and tray nominally stand: a real one by the floor, the other by the hands.
+
+    Args:
+        config: says which pack it is, and how the robot is held.
+        standing: height of base_link when the robot stands [m].
+    """
+    raised = config.hoist.height - standing  # how much higher the robot is in its hoist
+    hangs = config.support == "hoist"
+    if config.world in IONIQ5:
+        return Ioniq5Layout().raised(raised if hangs else 0.0)
+    return PackLayout() if hangs else PackLayout().raised(-raised)
+
+
+def ranges_of(world: str) -> Mapping[str, tuple[float, float]]:
+    """Return the ranges of a varied work place."""
+    return IONIQ5_RANGES if world in IONIQ5 else RANGES
+
+
 def build_scene(config: MujocoConfig, layout: PackLayout, profile: RealismProfile, seed: int) -> Scene:
     """Compile the world of one seed.
 
@@ -100,18 +129,18 @@ def _build(spec: mujoco.MjSpec, config: MujocoConfig, layout: PackLayout, profil
     kitchen: KitchenLayout | None = None
     names = PackNames((), np.zeros((0, 3)), "", ())
     layout_kind = config.layout if config.world in WITH_PACK else "nominal"
-    conditions = draw_conditions(layout_kind, config.conditions, world_stream(seed))
+    conditions = draw_conditions(layout_kind, config.conditions, world_stream(seed), ranges_of(config.world))
     nominal, stance = layout, PlanarPose(*config.stance)
-    if config.world == "plant":
+    if config.world in PLANTS:
         people = _add_terrain(spec, config, seed)
     if config.world in WITH_PACK:
         layout = arranged(layout, conditions)
         reach_y = config.reach_y if config.layout == "nominal" else REACH_Y
         places = draw_fasteners(layout, conditions, reach_y, stream(seed, "world/fasteners"))
         layout = replace(layout, empty_holes=(*layout.empty_holes, *places.missing))
-        draws = draw_screws(stream(seed, "world/screws"), profile.screws, places.loose)
+        draws = draw_screws(stream(seed, "world/screws"), profile.screws, places.loose, layout.kind)
         layout = layout.seen_with(stance)
-        names = add_pack(spec, layout, draws, stance=stance, workshop=config.world == "pack")
+        names = add_pack(spec, layout, draws, stance=stance, workshop=config.world not in PLANTS)
         add_clutter(spec, layout, round(conditions.clutter), stream(seed, "world/clutter"))
         dress(spec, conditions, stance)
         _add_onlooker(spec, layout)
@@ -242,8 +271,8 @@ def _add_payload(hand: mujoco.MjsBody, mass: float) -> None:
 
 def _add_terrain(spec: mujoco.MjSpec, config: MujocoConfig, seed: int) -> tuple[Person, ...]:
     """Add the ground of a world other than the workshop, and return the people on it."""
-    if config.world in ("furnished", "plant"):
-        furnished.add_furnished_hall(spec, stream(seed, "world/furniture"), bare=config.world == "plant")
+    if config.world in ("furnished", *PLANTS):
+        furnished.add_furnished_hall(spec, stream(seed, "world/furniture"), bare=config.world in PLANTS)
         furnished.add_course(spec, stream(seed, "world/course"), config.obstacles)
         return furnished.add_people(spec, stream(seed, "world/people"), config.people)
     if config.world == "corridor":

@@ -9,7 +9,7 @@ from golem.robots.worlds import parts
 from golem.robots.worlds.layout import PackLayout, yaw_quat
 
 CLEAR = 0.05
-"""Distance that things keep from fasteners of the near edge, from the tray and from the opened section [m]."""
+"""Distance that things keep from fasteners of the near edge, from trays and from the opened section [m]."""
 ATTEMPTS = 30
 
 _BOX = mujoco.mjtGeom.mjGEOM_BOX
@@ -27,13 +27,14 @@ def add_clutter(spec: mujoco.MjSpec, layout: PackLayout, count: int, rng: np.ran
         rng: the same state puts the same things at the same places.
     """
     pack = spec.body("pack")
-    T_pack_tray = np.linalg.inv(layout.pose()) @ layout.tray_pose()
+    T_pack = np.linalg.inv(layout.pose())
+    trays = np.array([(T_pack @ tray.pose())[:2, 3] for tray in layout.trays()])
     tray_radius = 0.5 * float(np.hypot(*layout.tray_size[:2]))
     placed: list[tuple[float, float]] = []
     for k in range(count):
         for _ in range(ATTEMPTS):
             x, y = float(rng.uniform(0.08, 0.75)), float(rng.uniform(-0.55, 0.55))
-            if _free(layout, x, y, T_pack_tray[:2, 3], tray_radius, placed):
+            if _free(layout, x, y, trays, tray_radius, placed):
                 break
         else:
             continue
@@ -44,14 +45,14 @@ def add_clutter(spec: mujoco.MjSpec, layout: PackLayout, count: int, rng: np.ran
 
 
 def _free(
-    layout: PackLayout, x: float, y: float, tray: np.ndarray, radius: float, placed: list[tuple[float, float]]
+    layout: PackLayout, x: float, y: float, trays: np.ndarray, radius: float, placed: list[tuple[float, float]]
 ) -> bool:
     window = (
         layout.window_x[0] - CLEAR < x < layout.window_x[1] + CLEAR
         and layout.window_y[0] - CLEAR < y < layout.window_y[1] + CLEAR
     )
-    beside_tray = np.hypot(x - tray[0], y - tray[1]) > radius + CLEAR
-    return not window and bool(beside_tray) and all(np.hypot(x - a, y - b) > 2 * CLEAR for a, b in placed)
+    beside_trays = (np.hypot(x - trays[:, 0], y - trays[:, 1]) > radius + CLEAR).all()
+    return not window and bool(beside_trays) and all(np.hypot(x - a, y - b) > 2 * CLEAR for a, b in placed)
 
 
 def _washer(body: mujoco.MjsBody) -> None:

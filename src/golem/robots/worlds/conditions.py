@@ -157,13 +157,19 @@ def world_stream(seed: int) -> np.random.Generator:
     return stream(seed, "world/conditions")
 
 
-def draw_conditions(kind: LayoutKind, given: Mapping[str, Value], rng: np.random.Generator) -> Conditions:
+def draw_conditions(
+    kind: LayoutKind,
+    given: Mapping[str, Value],
+    rng: np.random.Generator,
+    ranges: Mapping[str, tuple[float, float]] = RANGES,
+) -> Conditions:
     """Return the conditions of one work place.
 
     Args:
         kind: `nominal` draws nothing.
         given: conditions that are not left to the draw.
         rng: the same state draws the same.
+        ranges: of what is drawn.
 
     Raises:
         ConfigError: see `check_condition`.
@@ -174,7 +180,7 @@ def draw_conditions(kind: LayoutKind, given: Mapping[str, Value], rng: np.random
             if name in CHOICES:
                 values[name] = CHOICES[name][int(rng.integers(len(CHOICES[name])))]
             else:
-                low, high = RANGES[name]
+                low, high = ranges[name]
                 logarithmic = name == "light"
                 drawn = rng.uniform(math.log(low), math.log(high)) if logarithmic else rng.uniform(low, high)
                 values[name] = math.exp(drawn) if logarithmic else float(drawn)
@@ -202,7 +208,7 @@ def arranged(layout: PackLayout, conditions: Conditions) -> PackLayout:
 
 @dataclass(frozen=True, slots=True)
 class Fasteners:
-    """What is in the places of the near edge.
+    """What is in the places of the near edge, of an `Ioniq5Layout` in all.
 
     Attributes:
         loose: places of the loosened screws, from right to left.
@@ -214,7 +220,7 @@ class Fasteners:
 
 
 def draw_fasteners(layout: PackLayout, conditions: Conditions, reach_y: float, rng: np.random.Generator) -> Fasteners:
-    """Return which of the near-edge fasteners are loose and which are gone; the others are tight.
+    """Return which of the fasteners `around` are loose and which are gone; the others are tight.
 
     At least one is loose where any could be, and of those, where there are such, one on the tray's side of the robot:
     no hand carries a screw across. What a hand cannot come to for the tray stays tight.
@@ -225,11 +231,12 @@ def draw_fasteners(layout: PackLayout, conditions: Conditions, reach_y: float, r
         reach_y: fasteners with |y| up to this take part [m].
         rng: the same state draws the same.
     """
-    spots = [s for s in layout.reachable(reach_y) if s not in layout.empty_holes and not _under_tray(layout, s)]
+    spots = [s for s in layout.around(reach_y) if s not in layout.empty_holes and not _under_tray(layout, s)]
+    near = set(layout.reachable(reach_y))
     luck = rng.random((len(spots), 2))
     order = np.argsort(luck[:, 0])
     count = max(1, round(conditions.loose * len(spots))) if spots else 0
-    aside = [_on_trays_side(layout, s) for s in spots]
+    aside = [_on_trays_side(layout, s) if s in near else -np.inf for s in spots]
     others = [k for least in (ASIDE, -ASIDE) for k in order.tolist() if aside[k] > least]
     if others and not any(aside[k] > -ASIDE for k in order[:count]):
         order[count - 1] = others[0]
@@ -241,10 +248,10 @@ def draw_fasteners(layout: PackLayout, conditions: Conditions, reach_y: float, r
 
 def _on_trays_side(layout: PackLayout, slot: int) -> float:
     """Return how far a place is from the robot's middle, to the side on which the tray is [m]."""
-    y = float((layout.pose() @ (*layout.fasteners()[slot], 0.0, 1.0))[1])
+    y = float((layout.pose() @ (*layout.fasteners()[slot], 1.0))[1])
     return float(np.copysign(1.0, layout.tray_xy[1])) * y
 
 
 def _under_tray(layout: PackLayout, slot: int) -> bool:
-    x, y, _, _ = np.linalg.inv(layout.tray_pose()) @ layout.pose() @ (*layout.fasteners()[slot], 0.0, 1.0)
-    return abs(x) < 0.5 * layout.tray_size[0] + ROOM and abs(y) < 0.5 * layout.tray_size[1] + ROOM
+    spot, room = layout.pose() @ (*layout.fasteners()[slot], 1.0), 0.5 * np.array(layout.tray_size[:2]) + ROOM
+    return any((np.abs(np.linalg.inv(t.pose()) @ spot)[:2] < room).all() for t in layout.trays())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -16,6 +17,26 @@ FASTENERS_Y = 21
 """Intervals along a short and a long side; 2 (13 + 21) = 68 fasteners, the count of RAPID (arXiv 2603.18520)."""
 HOLE_CELL = 0.007
 """Half side of the square that a bore or an empty hole takes out of the rim's collision and visual strips [m]."""
+
+
+Kind = Literal["screw", "nut", "bolt"]
+KINDS: tuple[Kind, ...] = ("screw", "nut", "bolt")
+
+
+@dataclass(frozen=True, slots=True)
+class TrayPlace:
+    """A tray: its body's `name`, the `kind` of fasteners it is for, and its underside's middle and heading [m, rad]."""
+
+    name: str
+    kind: Kind
+    x: float
+    y: float
+    z: float
+    yaw: float
+
+    def pose(self) -> Array:
+        """Return the (4, 4) pose in the world."""
+        return transform((self.x, self.y, self.z), rotation_rpy(0.0, 0.0, self.yaw))
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,10 +97,18 @@ class PackLayout:
 
     def tray_pose(self) -> Array:
         """Return the (4, 4) pose of the tray in the world: the middle of its underside."""
-        return transform((*self.tray_xy, self.tray_z), rotation_rpy(0.0, 0.0, self.tray_yaw))
+        return self.trays()[0].pose()
+
+    def trays(self) -> tuple[TrayPlace, ...]:
+        """Return where all trays stand, first the one of `tray_pose`."""
+        return (TrayPlace("tray", "screw", *self.tray_xy, self.tray_z, self.tray_yaw),)
+
+    def kind(self, slot: int) -> Kind:
+        """Return what is in a place."""
+        return "screw"
 
     def fasteners(self) -> Array:
-        """Return the (68, 2) x, y of the fasteners in the pack frame.
+        """Return the (68, 3) places of the fasteners in the pack frame, on the surface they are screwed to.
 
         Index 0 is the near right corner (y < 0); the near edge comes first, from right to left, then the left
         side, the far edge from left to right, and the right side back to the start.
@@ -94,7 +123,15 @@ class PackLayout:
             np.column_stack([np.full(FASTENERS_Y, far), y_up[:0:-1]]),
             np.column_stack([x_out[:0:-1], np.full(FASTENERS_X, right)]),
         ]
-        return np.concatenate(sides)
+        return np.column_stack([np.concatenate(sides), np.zeros(2 * (FASTENERS_X + FASTENERS_Y))])
+
+    def holes(self) -> Array:
+        """Return the (n, 3) holes that never held a fastener, in the pack frame."""
+        return np.zeros((0, 3))
+
+    def around(self, reach_y: float) -> list[int]:
+        """Return the places where fasteners may be loose or gone: here those of `reachable`."""
+        return self.reachable(reach_y)
 
     def reachable(self, reach_y: float = 0.35) -> list[int]:
         """Return the indices of the near-edge fasteners with |y| <= `reach_y` [m], from right to left."""

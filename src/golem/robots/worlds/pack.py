@@ -13,38 +13,17 @@ import mujoco
 import numpy as np
 
 from golem.errors import ConfigError
-from golem.robots.worlds import hall, parts, screws, tray
-from golem.robots.worlds.layout import HOLE_CELL, PackLayout, yaw_quat
+from golem.robots.worlds import even_cover, hall, ioniq5_cover, nuts, opened_section, parts, screws, tray
+from golem.robots.worlds.ioniq5 import Ioniq5Layout
+from golem.robots.worlds.layout import PackLayout, yaw_quat
+from golem.robots.worlds.pack_part import PackPart
 from golem.robots.worlds.screws import ScrewDraw
 from golem.types import Array, PlanarPose
 
-COVER = 0.030
-"""Height of the cover above the pack's frame [m]; bores are inside it."""
-STUD_PITCH = 0.09
 FASTENER_HEAD = (0.0105, 0.006)
 """Across flats and height of the heads that are still tight [m]."""
 
-_BOX = mujoco.mjtGeom.mjGEOM_BOX
 _CYLINDER = mujoco.mjtGeom.mjGEOM_CYLINDER
-
-
-@dataclass(frozen=True, slots=True)
-class PackPart:
-    """One thing a detector can be asked for.
-
-    Attributes:
-        label: `screw`, `screw_hole`, `nut`, `bus_bar` or `tray`.
-        body: the body it belongs to.
-        geoms: the visible geoms that make it up; empty for a hole, which is an absence.
-        position: (3,) centre of its visible top in the world at the start [m]; a nut's top is under its stud's tip.
-        size: (3,) extent of its visible part along the axes of pack or tray [m].
-    """
-
-    label: str
-    body: str
-    geoms: tuple[str, ...]
-    position: Array
-    size: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,231 +88,38 @@ def add_pack(
         hall.add_lamps(spec, stance)
     T = layout.pose()
     body = spec.worldbody.add_body(name="pack", pos=T[:3, 3].tolist(), quat=yaw_quat(layout.yaw))
-    holes = {draw.slot: draw.bore_radius for draw in draws} | dict.fromkeys(layout.empty_holes, 0.003)
-    _add_stand(body, layout)
-    _add_rim(spec, body, layout, holes)
-    found = _add_window(spec, body, layout)
-    found += _add_fasteners(spec, body, layout, set(slots))
+    loose = {draw.slot: draw.bore_radius for draw in draws}
+    if isinstance(layout, Ioniq5Layout):
+        ioniq5_cover.add_cover(spec, body, layout, loose)
+    else:
+        even_cover.add_stand(body, layout)
+        even_cover.add_rim(spec, body, layout, loose | dict.fromkeys(layout.empty_holes, 0.003))
+    meshes = nuts.add_meshes(spec)
+    found = opened_section.add_window(body, layout, meshes)
+    found += _add_fasteners(spec, body, layout, set(slots), meshes)
     for draw in draws:
-        screws.add_bore(body, draw, (*spots[draw.slot], 0.0))
-    names = tuple(screws.add_screw(spec, draw, spots[draw.slot], T, sleep=sleep) for draw in draws)
-    for draw, name in zip(draws, names, strict=True):
+        (nuts.add_stud if draw.kind == "nut" else screws.add_bore)(body, draw, spots[draw.slot])
+    for draw in draws:
+        name, spot = draw.name, spots[draw.slot]
+        (nuts.add_nut if draw.kind == "nut" else screws.add_screw)(spec, draw, spot, T, sleep=sleep)
         reach = draw.protrusion + draw.head_height
-        looks = (f"{name}_flange", f"{name}_thread") + ((f"{name}_hex",) if draw.hexagonal else ())
+        looks = (f"{name}_flange",) if draw.kind == "nut" else (f"{name}_flange", f"{name}_thread")
+        looks += (f"{name}_hex",) if draw.hexagonal or draw.kind == "nut" else ()
         size = np.array([draw.head_diameter, draw.head_diameter, reach])
-        top = np.array([*spots[draw.slot], 0.0]) + reach * draw.axis()
-        found.append(PackPart("screw", name, looks, top, size))
+        label = "nut" if draw.kind == "nut" else "screw"
+        found.append(PackPart(label, name, looks, spot + reach * draw.axis(), size))
     found = [replace(part, position=T[:3, :3] @ part.position + T[:3, 3]) for part in found]
-    tray_name = tray.add_tray(spec, layout)
-    tray_geoms = tuple(f"tray_part_{k}" for k in range(5)) + tuple(f"tray_rim_{k}" for k in range(4))
-    top = np.array([*layout.tray_xy, layout.tray_z])
-    found.append(PackPart("tray", tray_name, tray_geoms, top, np.array(layout.tray_size)))
-    mouths = np.array([[*spots[s], 0.0] for s in slots]).reshape(-1, 3)
-    return PackNames(names, mouths @ T[:3, :3].T + T[:3, 3], tray_name, tuple(found))
+    for place in layout.trays():
+        tray.add_tray(spec, layout, place)
+        geoms = tuple(f"{place.name}_part_{k}" for k in range(5)) + tuple(f"{place.name}_rim_{k}" for k in range(4))
+        found.append(PackPart("tray", place.name, geoms, place.pose()[:3, 3], np.array(layout.tray_size)))
+    mouths = np.array([spots[s] for s in slots]).reshape(-1, 3)
+    return PackNames(tuple(d.name for d in draws), mouths @ T[:3, :3].T + T[:3, 3], "tray", tuple(found))
 
 
-def _add_stand(body: mujoco.MjsBody, layout: PackLayout) -> None:
-    """Add the pack's lower tray and the steel stand below it; only the outer block collides."""
-    cx, hx, hy = layout.size_x / 2, layout.size_x / 2, layout.size_y / 2
-    top = layout.window_depth + 0.025
-    below = (layout.thickness - top) / 2
-    mid = -top - below
-    parts.collider(body, _BOX, (hx, hy, below), (cx, 0, mid))
-    parts.visual(body, _BOX, (hx - 0.03, hy - 0.03, below), (cx, 0, mid), material="aluminium")
-    for side in (-1, 1):
-        flange = (top - COVER) / 2
-        for size, pos in (
-            ((0.03, hy, flange), (cx + side * (hx - 0.03), 0, -COVER - flange)),
-            ((hx - 0.06, 0.03, flange), (cx, side * (hy - 0.03), -COVER - flange)),
-        ):
-            parts.visual(body, _BOX, size, pos, material="aluminium")
-            parts.collider(body, _BOX, size, pos)
-    for y in np.linspace(-hy + 0.12, hy - 0.12, 6):
-        for x in (0.008, layout.size_x - 0.008):
-            parts.visual(body, _BOX, (0.02, 0.03, 0.02), (x, y, -layout.thickness + 0.03), material="aluminium")
-    for x, length in ((0.12, hy + 0.03), (layout.size_x - 0.12, hy + 0.03)):
-        parts.visual(body, _BOX, (0.03, length, 0.03), (x, 0, -layout.thickness - 0.03), material="stand_blue")
-    for y in (-0.7, 0.0, 0.7):
-        parts.visual(body, _BOX, (hx - 0.06, 0.025, 0.025), (cx, y, -layout.thickness - 0.085),
-                     material="stand_blue")  # fmt: skip
-    leg = (layout.top_z - layout.thickness - 0.06) / 2
-    for x in (0.12, layout.size_x - 0.12):
-        parts.visual(body, _BOX, (0.02, 0.7, 0.02), (x, 0, 0.16 - layout.top_z), material="stand_blue")
-        for y in (-0.7, 0.7):
-            size, pos = (0.03, 0.03, leg - 0.04), (x, y, -layout.thickness - 0.06 - leg + 0.04)
-            parts.visual(body, _BOX, size, pos, material="stand_blue")
-            parts.collider(body, _BOX, size, pos)
-            parts.visual(body, _CYLINDER, (0.05, 0.02), (x, y, 0.05 - layout.top_z), material="rubber",
-                         quat=(0.70710678, 0.70710678, 0, 0))  # fmt: skip
-    # High-voltage connectors and the service plug on the left end.
-    for x in (0.45, 0.62, 0.80):
-        parts.visual(body, _BOX, (0.05, 0.03, 0.035), (x, hy + 0.02, -0.075), material="hv_orange")
-        parts.visual(body, _CYLINDER, (0.022, 0.03), (x, hy + 0.07, -0.075), material="hv_orange",
-                     quat=(0.70710678, 0.70710678, 0, 0))  # fmt: skip
-
-
-def _add_rim(spec: mujoco.MjSpec, body: mujoco.MjsBody, layout: PackLayout, holes: dict[int, float]) -> None:
-    """Add the cover as boxes that leave a square open at each hole, and a holed plate in each square."""
-    spots = layout.fasteners()
-    wx0, wx1 = layout.window_x
-    wy0, wy1 = layout.window_y
-    hy = layout.size_y / 2
-    gantry = 2 * 0.022
-    by_side: dict[str, list[tuple[float, float]]] = {"near": [], "far": [], "left": [], "right": []}
-    for slot, radius in holes.items():
-        x, y = spots[slot]
-        side = "near" if x < gantry else "far" if x > layout.size_x - gantry else "left" if y > 0 else "right"
-        by_side[side].append((x, y))
-        plate = parts.add_mesh(spec, f"hole_plate_{slot:02d}", *parts.holed_plate(HOLE_CELL, radius, 0.022))
-        parts.visual_mesh(body, plate, (x, y, 0.0), material="cover_coat", name=f"hole_{slot:02d}")
-        if slot in layout.empty_holes:  # a dropped screw is wider than the hole: it rolls over it
-            parts.collider(body, _BOX, (HOLE_CELL, HOLE_CELL, COVER / 2), (x, y, -COVER / 2 - 0.0005))
-        parts.visual(body, _CYLINDER, (radius, 0.0005), (x, y, -0.0215), material="hole_dark")
-    # Four bands carry the fasteners, split at the holes; the field inside them surrounds the window.
-    _strip(body, (0.0, gantry), (-hy, hy), by_side["near"], along=1)
-    _strip(body, (layout.size_x - gantry, layout.size_x), (-hy, hy), by_side["far"], along=1)
-    _strip(body, (gantry, layout.size_x - gantry), (hy - gantry, hy), by_side["left"], along=0)
-    _strip(body, (gantry, layout.size_x - gantry), (-hy, -hy + gantry), by_side["right"], along=0)
-    x1, y1 = layout.size_x - gantry, hy - gantry
-    for xs, ys in (
-        ((gantry, wx0), (-y1, y1)),
-        ((wx1, x1), (-y1, y1)),
-        ((wx0, wx1), (-y1, wy0)),
-        ((wx0, wx1), (wy1, y1)),
-    ):
-        _slab(body, xs, ys)
-    for y in np.arange(-0.85, 0.9, 0.17):  # pressed beads
-        for xs in ((wx1 + 0.05, x1 - 0.05), (wx0 + 0.04, wx1 - 0.04)):
-            if xs[0] < wx1 and wy0 - 0.08 < y < wy1 + 0.08:
-                continue
-            if xs[0] < wx1 and layout.tray_z < layout.top_z + 0.01 and abs(y - layout.tray_xy[1]) < 0.2:
-                continue
-            parts.visual(body, _BOX, ((xs[1] - xs[0]) / 2, 0.035, 0.001), ((xs[0] + xs[1]) / 2, y, 0.0005),
-                         material="cover_bead")  # fmt: skip
-    parts.visual(body, _BOX, (0.045, 0.07, 0.0005), (0.085, 0.55, 0.0004), material="warning_yellow")
-    parts.visual(body, _BOX, (0.030, 0.06, 0.0005), (0.085, 0.73, 0.0004), material="label_white")
-    parts.visual(body, _BOX, (0.020, 0.002, 0.0006), (0.085, 0.535, 0.0006), material="dark")
-    for k in range(4):
-        parts.visual(body, _BOX, (0.002, 0.045 - 0.006 * (k % 2), 0.0006), (0.07 + 0.01 * k, 0.73, 0.0006),
-                     material="dark")  # fmt: skip
-
-
-def _slab(body: mujoco.MjsBody, xs: tuple[float, float], ys: tuple[float, float]) -> None:
-    """Add one piece of the cover, seen and colliding, from its extent in x and y; its top is z = 0."""
-    size = ((xs[1] - xs[0]) / 2, (ys[1] - ys[0]) / 2, COVER / 2)
-    pos = ((xs[0] + xs[1]) / 2, (ys[0] + ys[1]) / 2, -COVER / 2)
-    parts.collider(body, _BOX, size, pos)
-    parts.visual(body, _BOX, size, pos, material="cover_coat")
-
-
-def _strip(
-    body: mujoco.MjsBody,
-    xs: tuple[float, float],
-    ys: tuple[float, float],
-    holes: Sequence[tuple[float, float]],
-    *,
-    along: int,
-) -> None:
-    """Fill a band with slabs that leave a square of half side `HOLE_CELL` open at each of `holes`.
-
-    `along` is the axis (0 x, 1 y) the band runs along.
-    """
-    ranges = [xs, ys]
-    start = ranges[along][0]
-    for hole in sorted(holes, key=lambda h: h[along]):
-        low, high = hole[along] - HOLE_CELL, hole[along] + HOLE_CELL
-        pieces = [(start, low)]
-        across = ranges[1 - along]
-        sides = [(across[0], hole[1 - along] - HOLE_CELL), (hole[1 - along] + HOLE_CELL, across[1])]
-        for piece in pieces:
-            _slab(body, *((piece, ys) if along == 0 else (xs, piece)))
-        for side in sides:
-            _slab(body, *(((low, high), side) if along == 0 else (side, (low, high))))
-        start = high
-    last = (start, ranges[along][1])
-    _slab(body, *((last, ys) if along == 0 else (xs, last)))
-
-
-def _add_window(spec: mujoco.MjSpec, body: mujoco.MjsBody, layout: PackLayout) -> list[PackPart]:
-    """Add modules, bus bars and nuts in the opened section; where they are is in the pack frame."""
-    (x0, x1), (y0, y1), depth = layout.window_x, layout.window_y, layout.window_depth
-    floor = -depth
-    cx, cy, hx, hy = (x0 + x1) / 2, (y0 + y1) / 2, (x1 - x0) / 2, (y1 - y0) / 2
-    parts.collider(body, _BOX, (hx, hy, 0.01), (cx, cy, floor - 0.01))
-    parts.visual(body, _BOX, (hx, hy, 0.01), (cx, cy, floor - 0.012), material="dark")
-    lip = 0.004
-    for size, pos in (
-        ((hx + lip, lip / 2, 0.001), (cx, y0 - lip / 2, 0.0005)),
-        ((hx + lip, lip / 2, 0.001), (cx, y1 + lip / 2, 0.0005)),
-        ((lip / 2, hy, 0.001), (x0 - lip / 2, cy, 0.0005)),
-        ((lip / 2, hy, 0.001), (x1 + lip / 2, cy, 0.0005)),
-    ):
-        parts.visual(body, _BOX, size, pos, material="steel")
-    columns = int((y1 - y0 - 0.02) // (2 * STUD_PITCH))
-    pitch = 2 * STUD_PITCH
-    start = cy - pitch * columns / 2
-    nut = parts.add_mesh(spec, "nut", *parts.hexagon(0.010, 0.006))
-    washer = parts.add_mesh(spec, "washer", *parts.lathe([(0.0085, 0.0), (0.0085, 0.0012)], sides=24))
-    found: list[PackPart] = []
-    for row in range(2):
-        mx = x0 + (0.27 + 0.46 * row) * (x1 - x0)
-        for col in range(columns):
-            my = start + pitch * (col + 0.5)
-            parts.visual(body, _BOX, (0.095, pitch / 2 - 0.006, 0.009), (mx, my, floor + 0.001),
-                         material="module_black")  # fmt: skip
-            for end in (-1, 1):
-                parts.visual(body, _BOX, (0.012, pitch / 2 - 0.012, 0.004), (mx + end * 0.078, my, floor + 0.012),
-                             material="module_cap")  # fmt: skip
-            for rib in (-0.03, 0.0, 0.03):
-                parts.visual(body, _BOX, (0.004, pitch / 2 - 0.02, 0.001), (mx + rib, my, floor + 0.0105),
-                             material="module_cap")  # fmt: skip
-    top = floor + 0.014
-    for row in range(2):
-        for col in range(columns - 1):
-            by = start + pitch * (col + 1)
-            for k, offset in enumerate((-0.05, 0.045)):
-                if (row + 2 * col + k) % 4 == 3:
-                    continue
-                bx = x0 + (0.27 + 0.46 * row) * (x1 - x0) + offset
-                name = f"bus_bar_{row}{col}{k}"
-                found += _add_bus_bar(body, (bx, by, top), name, (nut, washer), along=1)
-    bx, by = cx, start + pitch * (columns - 0.5)
-    found += _add_bus_bar(body, (bx, by, top), "bus_bar_link", (nut, washer), along=0)
-    return found
-
-
-def _add_bus_bar(
-    body: mujoco.MjsBody, pos: tuple[float, float, float], name: str, meshes: tuple[str, str], *, along: int
+def _add_fasteners(
+    spec: mujoco.MjSpec, body: mujoco.MjsBody, layout: PackLayout, loose: set[int], meshes: tuple[str, str]
 ) -> list[PackPart]:
-    """Add one bar with an orange sleeve, a nut on a stud at each end, and their colliders."""
-    half = STUD_PITCH / 2 + 0.016
-    nut, washer = meshes
-    x, y, z = pos
-    thick = 0.0015
-    bar = (0.011, half, thick) if along else (half, 0.011, thick)
-    sleeve = (0.013, half - 0.034, 0.0045) if along else (half - 0.034, 0.013, 0.0045)
-    parts.visual(body, _BOX, bar, (x, y, z), material="copper", name=f"{name}_bar")
-    parts.visual(body, _BOX, sleeve, (x, y, z + 0.001), material="hv_orange", name=f"{name}_sleeve")
-    parts.collider(body, _BOX, bar, (x, y, z))
-    extent = np.array([2 * bar[0], 2 * bar[1], 2 * sleeve[2]])
-    centre = np.array([x, y, z + 0.0055])
-    found = [PackPart("bus_bar", "pack", (f"{name}_bar", f"{name}_sleeve"), centre, extent)]
-    for end in (-1, 1):
-        nx, ny = (x, y + end * STUD_PITCH / 2) if along else (x + end * STUD_PITCH / 2, y)
-        base = z + thick
-        label = f"nut_{name[8:]}_{'b' if end > 0 else 'a'}"
-        parts.visual_mesh(body, washer, (nx, ny, base), material="steel", name=f"{label}_washer")
-        parts.visual_mesh(body, nut, (nx, ny, base + 0.0012), material="zinc", name=f"{label}_hex")
-        parts.visual(body, _CYLINDER, (0.003, 0.006), (nx, ny, base + 0.006), material="steel",
-                     name=f"{label}_stud")  # fmt: skip
-        parts.collider(body, _CYLINDER, (0.0055, 0.006), (nx, ny, base + 0.006))
-        geoms = (f"{label}_washer", f"{label}_hex", f"{label}_stud")
-        tip = np.array([nx, ny, base + 0.0072])
-        found.append(PackPart("nut", "pack", geoms, tip, np.array([0.017, 0.017, 0.012])))
-    return found
-
-
-def _add_fasteners(spec: mujoco.MjSpec, body: mujoco.MjsBody, layout: PackLayout, loose: set[int]) -> list[PackPart]:
     """Add the tight fasteners and list the empty holes; where they are is in the pack frame."""
     flats, height = FASTENER_HEAD
     head = parts.add_mesh(spec, "fastener_hex", *parts.hexagon(flats, height))
@@ -341,15 +127,23 @@ def _add_fasteners(spec: mujoco.MjSpec, body: mujoco.MjsBody, layout: PackLayout
         spec, "fastener_flange", *parts.lathe([(0.0072, 0.0), (0.0072, 0.001), (0.0058, 0.0018)], sides=24)
     )
     found: list[PackPart] = []
-    for slot, (x, y) in enumerate(layout.fasteners()):
-        at = np.array([x, y, 0.0])
-        if slot in layout.empty_holes:
+    found += [PackPart("screw_hole", "pack", (), at, np.array([0.006, 0.006, 0.0])) for at in layout.holes()]
+    for slot, at in enumerate(layout.fasteners()):
+        x, y, z = at
+        if slot in loose:
+            continue
+        if layout.kind(slot) == "nut":
+            if slot in layout.empty_holes:
+                nuts.add_bare_stud(body, at)
+            else:
+                found.append(nuts.add_tight(body, meshes, at, f"nut_{slot:02d}"))
+        elif slot in layout.empty_holes:
             found.append(PackPart("screw_hole", "pack", (), at, np.array([0.006, 0.006, 0.0])))
-        elif slot not in loose:
+        else:
             names = (f"fastener_{slot:02d}_flange", f"fastener_{slot:02d}_hex")
-            parts.visual_mesh(body, flange, (x, y, 0.0), material="zinc", name=names[0])
-            parts.visual_mesh(body, head, (x, y, 0.0), material="zinc", name=names[1])
-            parts.collider(body, _CYLINDER, (0.006, height / 2), (x, y, height / 2))
+            parts.visual_mesh(body, flange, at, material="zinc", name=names[0])
+            parts.visual_mesh(body, head, at, material="zinc", name=names[1])
+            parts.collider(body, _CYLINDER, (0.006, height / 2), (x, y, z + height / 2))
             size = np.array([0.0144, 0.0144, height])
             found.append(PackPart("screw", "pack", names, at + [0, 0, height], size))
     return found

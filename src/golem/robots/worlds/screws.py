@@ -8,13 +8,14 @@ No geom here has a contact margin: with a fraction of a millimetre of clearance 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
 
 from golem.robots.worlds import parts
+from golem.robots.worlds.layout import Kind
 from golem.types import Array
 
 FACETS = 12
@@ -49,6 +50,21 @@ class ScrewRanges:
     head_height: tuple[float, float] = (0.005, 0.007)
     mass: tuple[float, float] = (0.015, 0.030)
 
+    def of(self, kind: Kind) -> ScrewRanges:
+        """Return the ranges of another kind of fastener with the same friction, clearance and tilt; assumed.
+
+        M6 flange nuts: the shank is the stud above its seat, the protrusion how far the nut has come up. An M8 bolt.
+        """
+        if kind == "nut":
+            low, high = self.protrusion
+            return replace(
+                self, protrusion=(0.8 * low, 0.8 * high), shank_diameter=(0.0058, 0.006),
+                shank_length=(0.012, 0.016), head_diameter=(0.012, 0.014), mass=(0.004, 0.008),
+            )  # fmt: skip
+        if kind == "bolt":
+            return replace(self, shank_diameter=(0.0078, 0.008), head_diameter=(0.015, 0.016), mass=(0.03, 0.045))
+        return self
+
 
 @dataclass(frozen=True, slots=True)
 class ScrewDraw:
@@ -57,6 +73,7 @@ class ScrewDraw:
     Attributes:
         slot: index of its place, as in `PackLayout.fasteners`.
         hexagonal: hexagon with flange (True) or cylinder head.
+        kind: what it is; see `ScrewRanges.of` for what the lengths of a nut mean.
         tilt: angle of the bore axis from the vertical [rad].
         tilt_azimuth: direction the head leans to, from the x axis [rad].
         friction, clearance, protrusion, shank_diameter, shank_length, head_diameter, head_height, mass: as in
@@ -75,6 +92,12 @@ class ScrewDraw:
     head_height: float
     mass: float
     hexagonal: bool
+    kind: Kind = "screw"
+
+    @property
+    def name(self) -> str:
+        """Name of its body and free joint."""
+        return f"{self.kind}_{self.slot:02d}"
 
     @property
     def engaged(self) -> float:
@@ -98,34 +121,38 @@ class ScrewDraw:
         return [np.cos(half), -np.sin(half) * np.sin(a), np.sin(half) * np.cos(a), 0.0]
 
 
-def draw_screws(rng: np.random.Generator, ranges: ScrewRanges, slots: Sequence[int]) -> list[ScrewDraw]:
-    """Draw one loosened screw for each of `slots`; the same generator state gives the same screws."""
+def draw_screws(
+    rng: np.random.Generator,
+    ranges: ScrewRanges,
+    slots: Sequence[int],
+    kind: Callable[[int], Kind] = lambda slot: "screw",
+) -> list[ScrewDraw]:
+    """Draw one loosened fastener of its `kind` for each of `slots`; the same generator state gives the same."""
 
     def uniform(span: tuple[float, float]) -> float:
         return float(rng.uniform(*span))
 
-    return [
-        ScrewDraw(
-            slot=slot,
-            friction=uniform(ranges.friction),
-            clearance=uniform(ranges.clearance),
-            protrusion=uniform(ranges.protrusion),
-            tilt=uniform(ranges.tilt),
-            tilt_azimuth=uniform((-np.pi, np.pi)),
-            shank_diameter=uniform(ranges.shank_diameter),
-            shank_length=uniform(ranges.shank_length),
-            head_diameter=uniform(ranges.head_diameter),
-            head_height=uniform(ranges.head_height),
-            mass=uniform(ranges.mass),
-            hexagonal=bool(rng.random() < 0.7),
+    draws: list[ScrewDraw] = []
+    for slot in slots:
+        r = ranges.of(kind(slot))
+        draws.append(
+            ScrewDraw(
+                slot=slot,
+                friction=uniform(r.friction),
+                clearance=uniform(r.clearance),
+                protrusion=uniform(r.protrusion),
+                tilt=uniform(r.tilt),
+                tilt_azimuth=uniform((-np.pi, np.pi)),
+                shank_diameter=uniform(r.shank_diameter),
+                shank_length=uniform(r.shank_length),
+                head_diameter=uniform(r.head_diameter),
+                head_height=uniform(r.head_height),
+                mass=uniform(r.mass),
+                hexagonal=bool(rng.random() < 0.7),
+                kind=kind(slot),
+            )
         )
-        for slot in slots
-    ]
-
-
-def screw_name(slot: int) -> str:
-    """Return the name of the body and of the free joint of the screw at `slot`."""
-    return f"screw_{slot:02d}"
+    return draws
 
 
 def add_bore(parent: mujoco.MjsBody, draw: ScrewDraw, mouth: Sequence[float]) -> None:
@@ -158,32 +185,36 @@ def add_bore(parent: mujoco.MjsBody, draw: ScrewDraw, mouth: Sequence[float]) ->
     )
 
 
-def add_screw(
+def loosened(
     spec: mujoco.MjSpec, draw: ScrewDraw, spot: Sequence[float], T_world_pack: Array, *, sleep: bool = True
-) -> str:
-    """Add the free body of `draw`, standing in its bore.
+) -> mujoco.MjsBody:
+    """Add the free body of `draw`, without geoms, where it stands proud of its place.
 
-    The body frame lies on the shank axis at the underside of the head, z towards the head's top.
+    The body frame lies on the axis of the shank at the underside of head or nut, z towards the top.
 
     Args:
         spec: the world.
-        draw: the screw.
-        spot: x, y of the bore's mouth in the pack frame [m].
+        draw: the fastener.
+        spot: x, y, z of the bore's mouth or the stud's seat in the pack frame [m].
         T_world_pack: (4, 4) pose of the pack frame.
-        sleep: let MuJoCo put the undisturbed screw to sleep (takes effect when the sleep flag is on).
-
-    Returns:
-        The name of body and joint.
+        sleep: let MuJoCo put it to sleep while undisturbed (takes effect when the sleep flag is on).
     """
-    name = screw_name(draw.slot)
-    mouth = T_world_pack @ (*spot, 0.0, 1.0)
+    mouth = T_world_pack @ (*spot, 1.0)
     pos = mouth[:3] + draw.protrusion * (T_world_pack[:3, :3] @ draw.axis())
     quat = np.zeros(4)
     mujoco.mju_mat2Quat(quat, T_world_pack[:3, :3].ravel())
     mujoco.mju_mulQuat(quat, quat.copy(), np.array(draw.quat()))
-    body = spec.worldbody.add_body(name=name, pos=pos.tolist(), quat=quat.tolist())
+    body = spec.worldbody.add_body(name=draw.name, pos=pos.tolist(), quat=quat.tolist())
     body.sleep = mujoco.mjtSleepPolicy.mjSLEEP_ALLOWED if sleep else mujoco.mjtSleepPolicy.mjSLEEP_NEVER
-    body.add_freejoint(name=name)
+    body.add_freejoint(name=draw.name)
+    return body
+
+
+def add_screw(
+    spec: mujoco.MjSpec, draw: ScrewDraw, spot: Sequence[float], T_world_pack: Array, *, sleep: bool = True
+) -> str:
+    """Add the free body of `draw`, standing in its bore; see `loosened`. Returns the name of body and joint."""
+    name, body = draw.name, loosened(spec, draw, spot, T_world_pack, sleep=sleep)
     head_volume = draw.head_diameter**2 * draw.head_height
     shank_volume = draw.shank_diameter**2 * draw.shank_length
     head_mass = draw.mass * head_volume / (head_volume + shank_volume)

@@ -14,7 +14,7 @@ from golem.robots.worlds.conditions import Conditions, draw_conditions
 from golem.robots.worlds.dressing import surfaces
 from golem.robots.worlds.layout import PackLayout
 from golem.robots.worlds.pack import PackNames, add_pack
-from golem.robots.worlds.screws import ScrewDraw, ScrewRanges, draw_screws, screw_name
+from golem.robots.worlds.screws import ScrewDraw, ScrewRanges, draw_screws
 from golem.training.detector import random_scene
 from golem.training.detector.random_scene import Bore, Compiled, RandomScene
 from golem.types import Array, CameraInfo, Side
@@ -39,8 +39,8 @@ class RandomPack(RandomScene):
     def __init__(self, world: Compiled, layout: PackLayout, names: PackNames, draws: tuple[ScrewDraw, ...]) -> None:
         """Keep what was compiled."""
         pairs = zip(draws, names.mouths, strict=True)
-        bores = tuple(Bore(mouth, draw.bore_radius, screw_name(draw.slot)) for draw, mouth in pairs)
-        tops = {screw_name(draw.slot): draw.head_height for draw in draws}
+        bores = tuple(Bore(mouth, draw.bore_radius, draw.name) for draw, mouth in pairs)
+        tops = {draw.name: draw.head_height for draw in draws}
         super().__init__(world, names.parts, bores, tops)
         self.layout, self.tray, self.draws = layout, names.tray, draws
 
@@ -83,7 +83,7 @@ class RandomPack(RandomScene):
         low = np.array([layout.near_edge, -0.7, layout.top_z])
         random_scene.scatter(self.world, low, low + (0.8, 1.4, 0.012), rng)
         for draw in self.draws:
-            at = model.joint(screw_name(draw.slot)).qposadr[0]
+            at = model.joint(draw.name).qposadr[0]
             choice = rng.random()
             if choice < 0.15:
                 data.qpos[at : at + 3] += rng.uniform(0.0, 0.02) * draw.axis()
@@ -131,7 +131,7 @@ class RandomPack(RandomScene):
         site = model.site(f"{side}_gripper").id
         R_grip: Array = data.site_xmat[site].reshape(3, 3)
         tilt = Rotation.from_rotvec(0.15 * rng.standard_normal(3)).as_matrix()
-        at = model.joint(screw_name(held.slot)).qposadr[0]
+        at = model.joint(held.name).qposadr[0]
         data.qpos[at : at + 3] = data.site_xpos[site] - R_grip[:, 2] * rng.uniform(0.0, 0.01)
         upright = R_grip @ T_MUJOCO_OPTICAL[:3, :3] @ tilt
         data.qpos[at + 3 : at + 7] = Rotation.from_matrix(upright).as_quat(scalar_first=True)

@@ -1,0 +1,80 @@
+"""What the builders of packs share: parts that a detector knows, pieces of cover, holes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import mujoco
+
+from golem.robots.worlds import parts
+from golem.robots.worlds.layout import HOLE_CELL, PackLayout
+from golem.types import Array
+
+COVER = 0.030
+"""Height of the cover above the pack's frame [m]; bores are inside it."""
+_BOX = mujoco.mjtGeom.mjGEOM_BOX
+_CYLINDER = mujoco.mjtGeom.mjGEOM_CYLINDER
+
+
+@dataclass(frozen=True, slots=True)
+class PackPart:
+    """One thing a detector can be asked for.
+
+    Attributes:
+        label: `screw`, `screw_hole`, `nut`, `bus_bar` or `tray`.
+        body: the body it belongs to.
+        geoms: the visible geoms that make it up; empty for a hole, which is an absence.
+        position: (3,) centre of its visible top in the world at the start [m]; a nut's top is under its stud's tip.
+        size: (3,) extent of its visible part along the axes of pack or tray [m].
+    """
+
+    label: str
+    body: str
+    geoms: tuple[str, ...]
+    position: Array
+    size: Array
+
+
+def add_slab(body: mujoco.MjsBody, xs: tuple[float, float], ys: tuple[float, float], top: float = 0.0) -> None:
+    """Add one piece of cover or ledge, seen and colliding, from its extent in x and y and the height of its top."""
+    size = ((xs[1] - xs[0]) / 2, (ys[1] - ys[0]) / 2, COVER / 2)
+    pos = ((xs[0] + xs[1]) / 2, (ys[0] + ys[1]) / 2, top - COVER / 2)
+    parts.collider(body, _BOX, size, pos)
+    parts.visual(body, _BOX, size, pos, material="cover_coat")
+
+
+def add_hole(
+    spec: mujoco.MjSpec, body: mujoco.MjsBody, name: str, at: Sequence[float], radius: float, *, closed: bool
+) -> None:
+    """Fill the square of `HOLE_CELL` around `at` (3,) with a holed plate; where `closed`, nothing falls in."""
+    x, y, z = at
+    plate = parts.add_mesh(spec, f"hole_plate_{name}", *parts.holed_plate(HOLE_CELL, radius, 0.022))
+    parts.visual_mesh(body, plate, (x, y, z), material="cover_coat", name=f"hole_{name}")
+    if closed:  # a dropped screw is wider than the hole: it rolls over it
+        parts.collider(body, _BOX, (HOLE_CELL, HOLE_CELL, COVER / 2), (x, y, z - COVER / 2 - 0.0005))
+    parts.visual(body, _CYLINDER, (radius, 0.0005), (x, y, z - 0.0215), material="hole_dark")
+
+
+def add_legs(body: mujoco.MjsBody, layout: PackLayout) -> None:
+    """Add the steel stand below a pack, and the connectors on its left end; only the legs collide."""
+    cx, hx, hy = layout.size_x / 2, layout.size_x / 2, layout.size_y / 2
+    for x, length in ((0.12, hy + 0.03), (layout.size_x - 0.12, hy + 0.03)):
+        parts.visual(body, _BOX, (0.03, length, 0.03), (x, 0, -layout.thickness - 0.03), material="stand_blue")
+    for y in (-0.7, 0.0, 0.7):
+        parts.visual(body, _BOX, (hx - 0.06, 0.025, 0.025), (cx, y, -layout.thickness - 0.085),
+                     material="stand_blue")  # fmt: skip
+    leg = (layout.top_z - layout.thickness - 0.06) / 2
+    for x in (0.12, layout.size_x - 0.12):
+        parts.visual(body, _BOX, (0.02, 0.7, 0.02), (x, 0, 0.16 - layout.top_z), material="stand_blue")
+        for y in (-0.7, 0.7):
+            size, pos = (0.03, 0.03, leg - 0.04), (x, y, -layout.thickness - 0.06 - leg + 0.04)
+            parts.visual(body, _BOX, size, pos, material="stand_blue")
+            parts.collider(body, _BOX, size, pos)
+            parts.visual(body, _CYLINDER, (0.05, 0.02), (x, y, 0.05 - layout.top_z), material="rubber",
+                         quat=(0.70710678, 0.70710678, 0, 0))  # fmt: skip
+    # High-voltage connectors and the service plug on the left end.
+    for x in (0.45, 0.62, 0.80):
+        parts.visual(body, _BOX, (0.05, 0.03, 0.035), (x, hy + 0.02, -0.075), material="hv_orange")
+        parts.visual(body, _CYLINDER, (0.022, 0.03), (x, hy + 0.07, -0.075), material="hv_orange",
+                     quat=(0.70710678, 0.70710678, 0, 0))  # fmt: skip
