@@ -19,13 +19,15 @@ HEIGHTS = (0.75, 1.06)
 """What a varied work place draws it from [m]."""
 IONIQ5_RANGES = RANGES | {"height": (HEIGHTS[0] - RIM, HEIGHTS[1] - RIM)}
 """Ranges of a varied work place; see `conditions.RANGES`."""
+LONG_EDGES = (0.145, 1.092)
+"""x of the trays along the long edges, in the pack frame [m]."""
 _TRAYS: tuple[tuple[str, Kind, tuple[float, float, float]], ...] = (
-    ("tray", "screw", (0.145, -0.28, 0.0)),
-    ("tray_nuts", "nut", (0.145, -0.55, 0.0)),
+    ("tray", "screw", (LONG_EDGES[0], -0.28, 0.0)),
+    ("tray_nuts", "nut", (LONG_EDGES[0], -0.55, 0.0)),
     ("tray_left", "screw", (0.45, 0.81, np.pi / 2)),
     ("tray_left_nuts", "nut", (0.72, 0.81, np.pi / 2)),
-    ("tray_far", "screw", (1.092, 0.28, np.pi)),
-    ("tray_far_nuts", "nut", (1.092, 0.55, np.pi)),
+    ("tray_far", "screw", (LONG_EDGES[1], 0.28, np.pi)),
+    ("tray_far_nuts", "nut", (LONG_EDGES[1], 0.55, np.pi)),
     ("tray_right", "screw", (0.72, -0.90, -np.pi / 2)),
     ("tray_right_nuts", "nut", (0.45, -0.90, -np.pi / 2)),
 )
@@ -78,12 +80,12 @@ class Ioniq5Layout(PackLayout):
     def trays(self) -> tuple[TrayPlace, ...]:
         """Return all trays: where the first is moved or turned from its place, each is on its own.
 
-        Where the first is on the robot's left, all are mirrored about the pack's middle.
+        Where the first is on the robot's left, those along the long edges are mirrored.
         """
         pack = PlanarPose(self.near_edge, self.center_y, self.yaw)
         first = pack.to(PlanarPose(*self.tray_xy, self.tray_yaw))
         side = -1.0 if first.y > 0.0 else 1.0
-        homes = [PlanarPose(x, side * y, side * yaw) for _, _, (x, y, yaw) in _TRAYS]
+        homes = [PlanarPose(x, y * (side if x in LONG_EDGES else 1.0), yaw) for _, _, (x, y, yaw) in _TRAYS]
         moved = homes[0].to(first)
         places = [pack @ home @ moved for home in homes]
         return tuple(
