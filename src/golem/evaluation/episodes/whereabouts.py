@@ -22,12 +22,9 @@ BESIDE = 0.005
 
 @dataclass(frozen=True, slots=True)
 class Whereabouts:
-    """One fastener.
+    """One fastener, and whether it was loosened.
 
     Attributes:
-        slot: its place in the layout.
-        kind: what it is.
-        loose: whether it was loosened.
         where: `seated`: in its bore, on its stud; `lifted`: out of it, in a hand or on the pack; `tray`; `floor`.
         tray: name of the tray that it is in.
         right: whether that tray is for its kind; a bolt goes with the screws.

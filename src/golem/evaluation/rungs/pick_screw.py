@@ -36,7 +36,6 @@ from golem.provenance import stack_facts
 from golem.robots.mujoco.balance import TRACE, BalanceRecorder, BalanceTrace
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.mujoco.gl import shared_context
-from golem.robots.mujoco.scene import ranges_of
 from golem.robots.worlds.conditions import Conditions, LayoutKind, draw_conditions, world_stream
 from golem.runtime.executor import when_stepped
 from golem.runtime.lockstep import LockstepRunner
@@ -209,7 +208,7 @@ class PickOptions:
 def conditions_of(options: PickOptions, spec: TrialSpec) -> Conditions:
     """Return the conditions of a trial's work place."""
     rng = world_stream(episode_seed(spec.seed, spec.index))
-    return draw_conditions(options.layout, spec.case, rng, ranges_of(options.world))
+    return draw_conditions(options.layout, spec.case, rng, options.world)
 
 
 def let_go(running: LockstepRunner, robot: MujocoRobot) -> TrialOutcome | None:

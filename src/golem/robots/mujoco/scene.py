@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -19,19 +18,11 @@ from golem.robots.sensors.profiles import RealismProfile
 from golem.robots.sensors.streams import stream
 from golem.robots.worlds import furnished, terrain
 from golem.robots.worlds.clutter import add_clutter
-from golem.robots.worlds.conditions import (
-    RANGES,
-    REACH_Y,
-    Conditions,
-    arranged,
-    draw_conditions,
-    draw_fasteners,
-    world_stream,
-)
+from golem.robots.worlds.conditions import REACH_Y, Conditions, arranged, draw_conditions, draw_fasteners, world_stream
 from golem.robots.worlds.dressing import dress
 from golem.robots.worlds.fridge import Seal, seal_of
 from golem.robots.worlds.furnished import Person
-from golem.robots.worlds.ioniq5 import IONIQ5_RANGES, Ioniq5Layout
+from golem.robots.worlds.ioniq5 import Ioniq5Layout
 from golem.robots.worlds.kitchen import KitchenLayout, add_kitchen, draw_counter, draw_kitchen, mirrored
 from golem.robots.worlds.layout import PackLayout
 from golem.robots.worlds.pack import PackNames, add_pack
@@ -84,22 +75,11 @@ class Scene:
 
 
 def nominal_layout(config: MujocoConfig, standing: float) -> PackLayout:
-    """Return where pack and tray nominally stand: a real one by the floor, the other by the hands.
-
-    Args:
-        config: says which pack it is, and how the robot is held.
-        standing: height of base_link when the robot stands [m].
-    """
-    raised = config.hoist.height - standing  # how much higher the robot is in its hoist
-    hangs = config.support == "hoist"
-    if config.world in IONIQ5:
+    """Return where pack and tray nominally stand under a robot whose base_link is at `standing` [m] where it stands."""
+    raised, hangs = config.hoist.height - standing, config.support == "hoist"
+    if config.world in IONIQ5:  # by the floor, so that it is as far below the hands in the hoist
         return Ioniq5Layout().raised(raised if hangs else 0.0)
     return PackLayout() if hangs else PackLayout().raised(-raised)
-
-
-def ranges_of(world: str) -> Mapping[str, tuple[float, float]]:
-    """Return the ranges of a varied work place."""
-    return IONIQ5_RANGES if world in IONIQ5 else RANGES
 
 
 def build_scene(config: MujocoConfig, layout: PackLayout, profile: RealismProfile, seed: int) -> Scene:
@@ -129,7 +109,7 @@ def _build(spec: mujoco.MjSpec, config: MujocoConfig, layout: PackLayout, profil
     kitchen: KitchenLayout | None = None
     names = PackNames((), np.zeros((0, 3)), "", ())
     layout_kind = config.layout if config.world in WITH_PACK else "nominal"
-    conditions = draw_conditions(layout_kind, config.conditions, world_stream(seed), ranges_of(config.world))
+    conditions = draw_conditions(layout_kind, config.conditions, world_stream(seed), config.world)
     nominal, stance = layout, PlanarPose(*config.stance)
     if config.world in PLANTS:
         people = _add_terrain(spec, config, seed)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,14 +14,8 @@ from golem.types import Array
 
 @dataclass(frozen=True, slots=True)
 class ListErrors:
-    """What is wrong with a list; after the one of a real pack (two detections of one nut 8 to 22 mm apart).
-
-    Attributes:
-        place: standard deviation of a place along each axis [m].
-        kind: share of wrong classes.
-        double: share of fasteners that are listed twice, `apart` from each other [m].
-        missed: share that is not listed.
-    """
+    """What is wrong with a list: deviation of a place along each axis [m], shares of wrong classes, of fasteners that
+    are listed twice, `apart` as in the list of a real pack [m], and of those that are missed."""  # noqa: D205, D209
 
     place: float = 0.003
     kind: float = 0.05
@@ -29,9 +24,8 @@ class ListErrors:
     apart: tuple[float, float] = (0.008, 0.022)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Claimed:
-    """One row: the `name` the cell gives it, such as `Screw_12`, its class, and its place (3,) in the list's frame."""
+class Claimed(NamedTuple):
+    """One row: the name the cell gives it, such as `Screw_12`, its class, and its place (3,) in the list's frame."""
 
     name: str
     kind: Kind
@@ -39,35 +33,23 @@ class Claimed:
 
 
 def claimed_list(
-    layout: PackLayout, T_list_world: Array, errors: ListErrors, rng: np.random.Generator, gone: Sequence[int] = ()
+    layout: PackLayout, T_list_world: Array, errors: ListErrors, rng: np.random.Generator, gone: Collection[int] = ()
 ) -> list[Claimed]:
-    """Return what a gantry would claim of a pack.
-
-    Args:
-        layout: the truth.
-        T_list_world: (4, 4) the world in the frame of the list.
-        errors: what is wrong with it.
-        rng: the same state makes the same errors.
-        gone: places that hold nothing.
-    """
-    T = T_list_world @ layout.pose()
-    rows: list[tuple[Kind, Array]] = []
+    """Return what a gantry would claim of a pack whose places `gone` hold nothing; `T_list_world` is (4, 4)."""
+    T, rows = T_list_world @ layout.pose(), list[tuple[Kind, Array]]()
     for slot, spot in enumerate(layout.fasteners()):
-        luck, noise = rng.random(5), rng.normal(size=(2, 3)) * errors.place
+        luck, noise, kind = rng.random(5), rng.normal(size=3) * errors.place, layout.kind(slot)
         if slot in gone or luck[0] < errors.missed:
             continue
-        kind, at = layout.kind(slot), (T @ (*spot, 1.0))[:3]
         if luck[1] < errors.kind:
             kind = [other for other in KINDS if other != kind][int(2 * luck[2])]
-        rows.append((kind, at + noise[0]))
+        at = (T @ (*spot, 1.0))[:3] + noise
+        rows.append((kind, at))
         if luck[3] < errors.double:
-            low, high = errors.apart
-            away, turn = low + (high - low) * luck[2], 2 * np.pi * luck[4]
-            rows.append((kind, rows[-1][1] + away * np.array([np.cos(turn), np.sin(turn), 0.0])))
-    order = rng.permutation(len(rows))
-    count = dict.fromkeys(KINDS, 0)
-    claims: list[Claimed] = []
-    for kind, at in (rows[i] for i in order):
+            away, turn = errors.apart[0] + np.ptp(errors.apart) * luck[2], 2 * np.pi * luck[4]
+            rows.append((kind, at + away * np.array([np.cos(turn), np.sin(turn), 0.0])))
+    count, claims = dict.fromkeys(KINDS, 0), list[Claimed]()
+    for kind, at in (rows[i] for i in rng.permutation(len(rows))):
         claims.append(Claimed(f"{kind.capitalize()}_{count[kind]}", kind, at))
         count[kind] += 1
     return claims

@@ -108,6 +108,8 @@ RANGES: dict[str, tuple[float, float]] = {
     "clutter": (0.0, 6.0),
 }
 """Ranges of a varied work place; uniform, the light's in its logarithm."""
+HEIGHTS = dict.fromkeys(("ioniq5", "ioniq5_plant"), (-0.107, 0.203))
+"""Range of `height` at a real pack: its rim is 0.75 to 1.06 m over the floor."""
 CHOICES: dict[str, tuple[str, ...]] = {
     "tray_side": SIDES,
     "finish": FINISHES,
@@ -158,10 +160,7 @@ def world_stream(seed: int) -> np.random.Generator:
 
 
 def draw_conditions(
-    kind: LayoutKind,
-    given: Mapping[str, Value],
-    rng: np.random.Generator,
-    ranges: Mapping[str, tuple[float, float]] = RANGES,
+    kind: LayoutKind, given: Mapping[str, Value], rng: np.random.Generator, world: str = "pack"
 ) -> Conditions:
     """Return the conditions of one work place.
 
@@ -169,7 +168,7 @@ def draw_conditions(
         kind: `nominal` draws nothing.
         given: conditions that are not left to the draw.
         rng: the same state draws the same.
-        ranges: of what is drawn.
+        world: which pack stands there.
 
     Raises:
         ConfigError: see `check_condition`.
@@ -180,7 +179,7 @@ def draw_conditions(
             if name in CHOICES:
                 values[name] = CHOICES[name][int(rng.integers(len(CHOICES[name])))]
             else:
-                low, high = ranges[name]
+                low, high = HEIGHTS[world] if name == "height" and world in HEIGHTS else RANGES[name]
                 logarithmic = name == "light"
                 drawn = rng.uniform(math.log(low), math.log(high)) if logarithmic else rng.uniform(low, high)
                 values[name] = math.exp(drawn) if logarithmic else float(drawn)

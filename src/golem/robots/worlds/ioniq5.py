@@ -6,19 +6,15 @@ import csv
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
+from typing import NamedTuple
 
 import numpy as np
 
-from golem.robots.worlds.conditions import RANGES
 from golem.robots.worlds.layout import KINDS, Kind, PackLayout, TrayPlace
 from golem.types import Array, PlanarPose
 
 RIM = 0.857
 """Height of the rim over the floor on which the robot stands, at the condition `height` 0 [m]."""
-HEIGHTS = (0.75, 1.06)
-"""What a varied work place draws it from [m]."""
-IONIQ5_RANGES = RANGES | {"height": (HEIGHTS[0] - RIM, HEIGHTS[1] - RIM)}
-"""Ranges of a varied work place; see `conditions.RANGES`."""
 LONG_EDGES = (0.145, 1.092)
 """x of the trays along the long edges, in the pack frame [m]."""
 _TRAYS: tuple[tuple[str, Kind, tuple[float, float, float]], ...] = (
@@ -34,16 +30,8 @@ _TRAYS: tuple[tuple[str, Kind, tuple[float, float, float]], ...] = (
 """Name, kind, and x, y, yaw in the pack frame of trays on the right of who works at each edge [m, rad]."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Ioniq5Data:
-    """The rows of `ioniq5.csv`, in the pack frame.
-
-    Attributes:
-        kinds: of the fasteners.
-        fasteners: (84, 3) their places [m].
-        holes: (9, 3) [m].
-        cover: (n, 5) rectangles x0, x1, y0, y1 and the height of their top [m].
-    """
+class Ioniq5Data(NamedTuple):
+    """What `ioniq5.csv` has: kinds and (84, 3) places of the fasteners, (9, 3) holes, (n, 5) rectangles [m]."""
 
     kinds: tuple[Kind, ...]
     fasteners: Array
@@ -53,7 +41,7 @@ class Ioniq5Data:
 
 @cache
 def ioniq5_data() -> Ioniq5Data:
-    """Read `ioniq5.csv`."""
+    """Return the rows of the file; it says what they mean."""
     text = files(__package__ or "").joinpath("ioniq5.csv").read_text(encoding="utf-8")
     rows = [(row[0], [float(x) for x in row[1:]]) for row in csv.reader(text.splitlines()) if row[0][0] != "#"]
     kinds = tuple(known for kind, _ in rows for known in KINDS if kind == known)

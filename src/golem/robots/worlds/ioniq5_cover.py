@@ -2,52 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import mujoco
 import numpy as np
 
 from golem.robots.worlds import parts
 from golem.robots.worlds.ioniq5 import Ioniq5Layout, ioniq5_data
-from golem.robots.worlds.layout import HOLE_CELL
-from golem.robots.worlds.pack_part import COVER, add_hole, add_legs, add_slab
+from golem.robots.worlds.pack_part import COVER, Rectangle, Span, add_hole, add_legs, add_slab, square, without
 from golem.types import Array
 
-Span = tuple[float, float]
-Rectangle = tuple[float, float, float, float]
-"""x0, x1, y0, y1 [m]."""
 FRAME = (0.03, 1.20)
 """x at which the widest rectangle is cut in three, so that holes of the long edges split nothing but these [m]."""
 HOLE = 0.003
 """Radius of a hole without a fastener [m]."""
 
 
-def without(rectangle: Rectangle, cuts: Sequence[Rectangle]) -> list[tuple[Span, Span]]:
-    """Return the x and y spans of pieces that together are `rectangle` without `cuts`."""
-    x0, x1, y0, y1 = rectangle
-    mine = [c for c in cuts if c[0] < x1 and c[1] > x0 and c[2] < y1 and c[3] > y0]
-    ends = sorted({y0, y1, *(float(np.clip(y, y0, y1)) for c in mine for y in c[2:])})
-    pieces: list[tuple[Span, Span]] = []
-    for low, high in zip(ends[:-1], ends[1:], strict=True):
-        start = x0
-        for a, b, _, _ in sorted(c for c in mine if c[2] <= low and c[3] >= high):
-            if a > start:
-                pieces.append(((start, a), (low, high)))
-            start = max(start, b)
-        if start < x1:
-            pieces.append(((start, x1), (low, high)))
-    return pieces
-
-
 def add_cover(spec: mujoco.MjSpec, body: mujoco.MjsBody, layout: Ioniq5Layout, loose: Mapping[int, float]) -> None:
-    """Add everything of the pack that is no fastener.
-
-    Args:
-        spec: the world.
-        body: the pack's.
-        layout: says which places are empty.
-        loose: radius of the bore or stud by loosened place [m].
-    """
+    """Add to the pack's `body` all that is no fastener; `loose`: radius of the bore or stud by loosened place [m]."""
     spots = layout.fasteners()
     bores = {slot: radius for slot, radius in loose.items() if layout.kind(slot) != "nut"}
     gone = [slot for slot in layout.empty_holes if layout.kind(slot) != "nut"]
@@ -59,9 +31,7 @@ def add_cover(spec: mujoco.MjSpec, body: mujoco.MjsBody, layout: Ioniq5Layout, l
     window: Rectangle = (*layout.window_x, *layout.window_y)
     for x0, x1, y0, y1, top in ioniq5_data().cover:
         marks = [x0, *(x for x in FRAME if x0 < x < x1 and x1 - x0 > 1.2), x1]
-        cuts: list[Rectangle] = [
-            (x - HOLE_CELL, x + HOLE_CELL, y - HOLE_CELL, y + HOLE_CELL) for _, (x, y, z), _, _ in holes if z == top
-        ]
+        cuts = [square(at) for _, at, _, _ in holes if at[2] == top]
         for part in zip(marks[:-1], marks[1:], strict=True):
             for xs, ys in without((*part, y0, y1), [*cuts, window]):
                 add_slab(body, xs, ys, top)

@@ -20,8 +20,6 @@ FLATS = 0.8
 """Width across flats per diameter of the flange."""
 COLLAR = 0.0042
 """Radius of what a loosened nut stands on [m]."""
-STUD = (0.003, 0.012)
-"""Radius and length of a stud whose nut is tight or gone [m]."""
 
 _BOX = mujoco.mjtGeom.mjGEOM_BOX
 _CYLINDER = mujoco.mjtGeom.mjGEOM_CYLINDER
@@ -35,8 +33,15 @@ def add_meshes(spec: mujoco.MjSpec) -> tuple[str, str]:
     )
 
 
+def add_bare(body: mujoco.MjsBody, seat: Sequence[float]) -> None:
+    """Add a stud at `seat` (3,) whose nut is gone."""
+    size, pos = (0.003, 0.006), (seat[0], seat[1], seat[2] + 0.006)
+    parts.visual(body, _CYLINDER, size, pos, material="steel")
+    parts.collider(body, _CYLINDER, size, pos)
+
+
 def add_tight(body: mujoco.MjsBody, meshes: tuple[str, str], seat: Sequence[float], label: str) -> PackPart:
-    """Add a tight nut on its stud at `seat` (3,) in the frame of the pack's `body`; where it is is in that frame."""
+    """Add a tight nut on its stud at `seat` (3,) in the frame of the pack's `body`; its part is in that frame."""
     x, y, base = seat
     parts.visual_mesh(body, meshes[1], (x, y, base), material="steel", name=f"{label}_washer")
     parts.visual_mesh(body, meshes[0], (x, y, base + 0.0012), material="zinc", name=f"{label}_hex")
@@ -44,14 +49,6 @@ def add_tight(body: mujoco.MjsBody, meshes: tuple[str, str], seat: Sequence[floa
     parts.collider(body, _CYLINDER, (0.0055, 0.006), (x, y, base + 0.006))
     geoms = (f"{label}_washer", f"{label}_hex", f"{label}_stud")
     return PackPart("nut", "pack", geoms, np.array([x, y, base + 0.0072]), np.array([0.017, 0.017, 0.012]))
-
-
-def add_bare_stud(body: mujoco.MjsBody, seat: Sequence[float]) -> None:
-    """Add a stud whose nut is gone."""
-    radius, length = STUD
-    for add in (parts.visual, parts.collider):
-        looks = {"material": "steel"} if add is parts.visual else {}
-        add(body, _CYLINDER, (radius, length / 2), (seat[0], seat[1], seat[2] + length / 2), **looks)
 
 
 def add_stud(parent: mujoco.MjsBody, draw: ScrewDraw, seat: Sequence[float]) -> None:

@@ -13,16 +13,18 @@ import mujoco
 import numpy as np
 
 from golem.errors import ConfigError
-from golem.robots.worlds import even_cover, hall, ioniq5_cover, nuts, opened_section, parts, screws, tray
+from golem.robots.worlds import hall, ioniq5_cover, nuts, parts, screws, tray
 from golem.robots.worlds.ioniq5 import Ioniq5Layout
 from golem.robots.worlds.layout import PackLayout, yaw_quat
-from golem.robots.worlds.pack_part import PackPart
+from golem.robots.worlds.pack_part import COVER, PackPart, Span, add_hole, add_legs, add_slab, square, without
 from golem.robots.worlds.screws import ScrewDraw
 from golem.types import Array, PlanarPose
 
+STUD_PITCH = 0.09
 FASTENER_HEAD = (0.0105, 0.006)
 """Across flats and height of the heads that are still tight [m]."""
 
+_BOX = mujoco.mjtGeom.mjGEOM_BOX
 _CYLINDER = mujoco.mjtGeom.mjGEOM_CYLINDER
 
 
@@ -92,10 +94,10 @@ def add_pack(
     if isinstance(layout, Ioniq5Layout):
         ioniq5_cover.add_cover(spec, body, layout, loose)
     else:
-        even_cover.add_stand(body, layout)
-        even_cover.add_rim(spec, body, layout, loose | dict.fromkeys(layout.empty_holes, 0.003))
+        _add_stand(body, layout)
+        _add_rim(spec, body, layout, loose | dict.fromkeys(layout.empty_holes, 0.003))
     meshes = nuts.add_meshes(spec)
-    found = opened_section.add_window(body, layout, meshes)
+    found = _add_window(body, layout, meshes)
     found += _add_fasteners(spec, body, layout, set(slots), meshes)
     for draw in draws:
         (nuts.add_stud if draw.kind == "nut" else screws.add_bore)(body, draw, spots[draw.slot])
@@ -117,6 +119,148 @@ def add_pack(
     return PackNames(tuple(d.name for d in draws), mouths @ T[:3, :3].T + T[:3, 3], "tray", tuple(found))
 
 
+def _add_stand(body: mujoco.MjsBody, layout: PackLayout) -> None:
+    """Add the pack's lower tray and the steel stand below it."""
+    cx, hx, hy = layout.size_x / 2, layout.size_x / 2, layout.size_y / 2
+    top = layout.window_depth + 0.025
+    below = (layout.thickness - top) / 2
+    mid = -top - below
+    parts.collider(body, _BOX, (hx, hy, below), (cx, 0, mid))
+    parts.visual(body, _BOX, (hx - 0.03, hy - 0.03, below), (cx, 0, mid), material="aluminium")
+    for side in (-1, 1):
+        flange = (top - COVER) / 2
+        for size, pos in (
+            ((0.03, hy, flange), (cx + side * (hx - 0.03), 0, -COVER - flange)),
+            ((hx - 0.06, 0.03, flange), (cx, side * (hy - 0.03), -COVER - flange)),
+        ):
+            parts.visual(body, _BOX, size, pos, material="aluminium")
+            parts.collider(body, _BOX, size, pos)
+    for y in np.linspace(-hy + 0.12, hy - 0.12, 6):
+        for x in (0.008, layout.size_x - 0.008):
+            parts.visual(body, _BOX, (0.02, 0.03, 0.02), (x, y, -layout.thickness + 0.03), material="aluminium")
+    add_legs(body, layout)
+
+
+def _add_rim(spec: mujoco.MjSpec, body: mujoco.MjsBody, layout: PackLayout, holes: dict[int, float]) -> None:
+    """Add the cover as boxes that leave a square open at each hole, and a holed plate in each square."""
+    spots = layout.fasteners()
+    wx0, wx1 = layout.window_x
+    wy0, wy1 = layout.window_y
+    hy = layout.size_y / 2
+    gantry = 2 * 0.022
+    by_side: dict[str, list[tuple[float, float]]] = {"near": [], "far": [], "left": [], "right": []}
+    for slot, radius in holes.items():
+        x, y, _ = spots[slot]
+        side = "near" if x < gantry else "far" if x > layout.size_x - gantry else "left" if y > 0 else "right"
+        by_side[side].append((x, y))
+        add_hole(spec, body, f"{slot:02d}", spots[slot], radius, closed=slot in layout.empty_holes)
+    # Four bands carry the fasteners, split at the holes; the field inside them surrounds the window.
+    _strip(body, (0.0, gantry), (-hy, hy), by_side["near"], along=1)
+    _strip(body, (layout.size_x - gantry, layout.size_x), (-hy, hy), by_side["far"], along=1)
+    _strip(body, (gantry, layout.size_x - gantry), (hy - gantry, hy), by_side["left"], along=0)
+    _strip(body, (gantry, layout.size_x - gantry), (-hy, -hy + gantry), by_side["right"], along=0)
+    x1, y1 = layout.size_x - gantry, hy - gantry
+    for xs, ys in (
+        ((gantry, wx0), (-y1, y1)),
+        ((wx1, x1), (-y1, y1)),
+        ((wx0, wx1), (-y1, wy0)),
+        ((wx0, wx1), (wy1, y1)),
+    ):
+        add_slab(body, xs, ys)
+    for y in np.arange(-0.85, 0.9, 0.17):  # pressed beads
+        for xs in ((wx1 + 0.05, x1 - 0.05), (wx0 + 0.04, wx1 - 0.04)):
+            if xs[0] < wx1 and wy0 - 0.08 < y < wy1 + 0.08:
+                continue
+            if xs[0] < wx1 and layout.tray_z < layout.top_z + 0.01 and abs(y - layout.tray_xy[1]) < 0.2:
+                continue
+            parts.visual(body, _BOX, ((xs[1] - xs[0]) / 2, 0.035, 0.001), ((xs[0] + xs[1]) / 2, y, 0.0005),
+                         material="cover_bead")  # fmt: skip
+    parts.visual(body, _BOX, (0.045, 0.07, 0.0005), (0.085, 0.55, 0.0004), material="warning_yellow")
+    parts.visual(body, _BOX, (0.030, 0.06, 0.0005), (0.085, 0.73, 0.0004), material="label_white")
+    parts.visual(body, _BOX, (0.020, 0.002, 0.0006), (0.085, 0.535, 0.0006), material="dark")
+    for k in range(4):
+        parts.visual(body, _BOX, (0.002, 0.045 - 0.006 * (k % 2), 0.0006), (0.07 + 0.01 * k, 0.73, 0.0006),
+                     material="dark")  # fmt: skip
+
+
+def _strip(body: mujoco.MjsBody, xs: Span, ys: Span, holes: Sequence[tuple[float, float]], *, along: int) -> None:
+    """Fill a band along axis `along` (0 x, 1 y) with slabs that leave a `square` open at each of `holes`."""
+    if along == 1:
+        pieces = without((*xs, *ys), [square(hole) for hole in holes])
+    else:
+        pieces = [(x, y) for y, x in without((*ys, *xs), [square(hole[::-1]) for hole in holes])]
+    for piece in pieces:
+        add_slab(body, *piece)
+
+
+def _add_window(body: mujoco.MjsBody, layout: PackLayout, meshes: tuple[str, str]) -> list[PackPart]:
+    """Add modules, bus bars and nuts, of `nuts.add_meshes`, in the opened section; places are in the pack frame."""
+    (x0, x1), (y0, y1), depth = layout.window_x, layout.window_y, layout.window_depth
+    floor = -depth
+    cx, cy, hx, hy = (x0 + x1) / 2, (y0 + y1) / 2, (x1 - x0) / 2, (y1 - y0) / 2
+    parts.collider(body, _BOX, (hx, hy, 0.01), (cx, cy, floor - 0.01))
+    parts.visual(body, _BOX, (hx, hy, 0.01), (cx, cy, floor - 0.012), material="dark")
+    lip = 0.004
+    for size, pos in (
+        ((hx + lip, lip / 2, 0.001), (cx, y0 - lip / 2, 0.0005)),
+        ((hx + lip, lip / 2, 0.001), (cx, y1 + lip / 2, 0.0005)),
+        ((lip / 2, hy, 0.001), (x0 - lip / 2, cy, 0.0005)),
+        ((lip / 2, hy, 0.001), (x1 + lip / 2, cy, 0.0005)),
+    ):
+        parts.visual(body, _BOX, size, pos, material="steel")
+    columns = int((y1 - y0 - 0.02) // (2 * STUD_PITCH))
+    pitch = 2 * STUD_PITCH
+    start = cy - pitch * columns / 2
+    found: list[PackPart] = []
+    for row in range(2):
+        mx = x0 + (0.27 + 0.46 * row) * (x1 - x0)
+        for col in range(columns):
+            my = start + pitch * (col + 0.5)
+            parts.visual(body, _BOX, (0.095, pitch / 2 - 0.006, 0.009), (mx, my, floor + 0.001),
+                         material="module_black")  # fmt: skip
+            for end in (-1, 1):
+                parts.visual(body, _BOX, (0.012, pitch / 2 - 0.012, 0.004), (mx + end * 0.078, my, floor + 0.012),
+                             material="module_cap")  # fmt: skip
+            for rib in (-0.03, 0.0, 0.03):
+                parts.visual(body, _BOX, (0.004, pitch / 2 - 0.02, 0.001), (mx + rib, my, floor + 0.0105),
+                             material="module_cap")  # fmt: skip
+    top = floor + 0.014
+    for row in range(2):
+        for col in range(columns - 1):
+            by = start + pitch * (col + 1)
+            for k, offset in enumerate((-0.05, 0.045)):
+                if (row + 2 * col + k) % 4 == 3:
+                    continue
+                bx = x0 + (0.27 + 0.46 * row) * (x1 - x0) + offset
+                name = f"bus_bar_{row}{col}{k}"
+                found += _add_bus_bar(body, (bx, by, top), name, meshes, along=1)
+    bx, by = cx, start + pitch * (columns - 0.5)
+    found += _add_bus_bar(body, (bx, by, top), "bus_bar_link", meshes, along=0)
+    return found
+
+
+def _add_bus_bar(
+    body: mujoco.MjsBody, pos: tuple[float, float, float], name: str, meshes: tuple[str, str], *, along: int
+) -> list[PackPart]:
+    """Add one bar with an orange sleeve, a nut on a stud at each end, and their colliders."""
+    half = STUD_PITCH / 2 + 0.016
+    x, y, z = pos
+    thick = 0.0015
+    bar = (0.011, half, thick) if along else (half, 0.011, thick)
+    sleeve = (0.013, half - 0.034, 0.0045) if along else (half - 0.034, 0.013, 0.0045)
+    parts.visual(body, _BOX, bar, (x, y, z), material="copper", name=f"{name}_bar")
+    parts.visual(body, _BOX, sleeve, (x, y, z + 0.001), material="hv_orange", name=f"{name}_sleeve")
+    parts.collider(body, _BOX, bar, (x, y, z))
+    extent = np.array([2 * bar[0], 2 * bar[1], 2 * sleeve[2]])
+    centre = np.array([x, y, z + 0.0055])
+    found = [PackPart("bus_bar", "pack", (f"{name}_bar", f"{name}_sleeve"), centre, extent)]
+    for end in (-1, 1):
+        nx, ny = (x, y + end * STUD_PITCH / 2) if along else (x + end * STUD_PITCH / 2, y)
+        label = f"nut_{name[8:]}_{'b' if end > 0 else 'a'}"
+        found.append(nuts.add_tight(body, meshes, (nx, ny, z + thick), label))
+    return found
+
+
 def _add_fasteners(
     spec: mujoco.MjSpec, body: mujoco.MjsBody, layout: PackLayout, loose: set[int], meshes: tuple[str, str]
 ) -> list[PackPart]:
@@ -134,7 +278,7 @@ def _add_fasteners(
             continue
         if layout.kind(slot) == "nut":
             if slot in layout.empty_holes:
-                nuts.add_bare_stud(body, at)
+                nuts.add_bare(body, at)
             else:
                 found.append(nuts.add_tight(body, meshes, at, f"nut_{slot:02d}"))
         elif slot in layout.empty_holes:

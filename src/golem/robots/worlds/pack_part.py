@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import mujoco
+import numpy as np
 
 from golem.robots.worlds import parts
 from golem.robots.worlds.layout import HOLE_CELL, PackLayout
@@ -15,6 +16,10 @@ COVER = 0.030
 """Height of the cover above the pack's frame [m]; bores are inside it."""
 _BOX = mujoco.mjtGeom.mjGEOM_BOX
 _CYLINDER = mujoco.mjtGeom.mjGEOM_CYLINDER
+
+Span = tuple[float, float]
+Rectangle = tuple[float, float, float, float]
+"""x0, x1, y0, y1 [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +41,30 @@ class PackPart:
     size: Array
 
 
-def add_slab(body: mujoco.MjsBody, xs: tuple[float, float], ys: tuple[float, float], top: float = 0.0) -> None:
+def square(hole: Sequence[float]) -> Rectangle:
+    """Return what a hole at x, y takes out of the cover."""
+    x, y = hole[:2]
+    return x - HOLE_CELL, x + HOLE_CELL, y - HOLE_CELL, y + HOLE_CELL
+
+
+def without(rectangle: Rectangle, cuts: Sequence[Rectangle]) -> list[tuple[Span, Span]]:
+    """Return the x and y spans of pieces that together are `rectangle` without `cuts`."""
+    x0, x1, y0, y1 = rectangle
+    mine = [c for c in cuts if c[0] < x1 and c[1] > x0 and c[2] < y1 and c[3] > y0]
+    ends = sorted({y0, y1, *(float(np.clip(y, y0, y1)) for c in mine for y in c[2:])})
+    pieces: list[tuple[Span, Span]] = []
+    for low, high in zip(ends[:-1], ends[1:], strict=True):
+        start = x0
+        for a, b, _, _ in sorted(c for c in mine if c[2] <= low and c[3] >= high):
+            if a > start:
+                pieces.append(((start, a), (low, high)))
+            start = max(start, b)
+        if start < x1:
+            pieces.append(((start, x1), (low, high)))
+    return pieces
+
+
+def add_slab(body: mujoco.MjsBody, xs: Span, ys: Span, top: float = 0.0) -> None:
     """Add one piece of cover or ledge, seen and colliding, from its extent in x and y and the height of its top."""
     size = ((xs[1] - xs[0]) / 2, (ys[1] - ys[0]) / 2, COVER / 2)
     pos = ((xs[0] + xs[1]) / 2, (ys[0] + ys[1]) / 2, top - COVER / 2)

@@ -188,16 +188,10 @@ def add_bore(parent: mujoco.MjsBody, draw: ScrewDraw, mouth: Sequence[float]) ->
 def loosened(
     spec: mujoco.MjSpec, draw: ScrewDraw, spot: Sequence[float], T_world_pack: Array, *, sleep: bool = True
 ) -> mujoco.MjsBody:
-    """Add the free body of `draw`, without geoms, where it stands proud of its place.
+    """Add the free body of `draw`, without geoms, proud of its `spot` (3,) in the pack frame `T_world_pack` (4, 4).
 
-    The body frame lies on the axis of the shank at the underside of head or nut, z towards the top.
-
-    Args:
-        spec: the world.
-        draw: the fastener.
-        spot: x, y, z of the bore's mouth or the stud's seat in the pack frame [m].
-        T_world_pack: (4, 4) pose of the pack frame.
-        sleep: let MuJoCo put it to sleep while undisturbed (takes effect when the sleep flag is on).
+    The body frame lies on the axis of the shank at the underside of head or nut, z towards the top. With `sleep`,
+    MuJoCo puts it to sleep while undisturbed (takes effect when the sleep flag is on).
     """
     mouth = T_world_pack @ (*spot, 1.0)
     pos = mouth[:3] + draw.protrusion * (T_world_pack[:3, :3] @ draw.axis())
