@@ -107,7 +107,7 @@ def _build(spec: mujoco.MjSpec, config: MujocoConfig, layout: PackLayout, profil
     draws: list[ScrewDraw] = []
     people: tuple[Person, ...] = ()
     kitchen: KitchenLayout | None = None
-    names = PackNames((), np.zeros((0, 3)), "", ())
+    names = PackNames((), np.zeros((0, 3)), ())
     layout_kind = config.layout if config.world in WITH_PACK else "nominal"
     conditions = draw_conditions(layout_kind, config.conditions, world_stream(seed), config.world)
     nominal, stance = layout, PlanarPose(*config.stance)
@@ -126,7 +126,7 @@ def _build(spec: mujoco.MjSpec, config: MujocoConfig, layout: PackLayout, profil
         _add_onlooker(spec, layout)
     elif config.world in KITCHENS:
         kitchen = lay_kitchen(config, seed, layout.top_z - PackLayout().top_z)
-        names = PackNames((), np.zeros((0, 3)), "", add_kitchen(spec, kitchen, (stance.x, stance.y)))
+        names = PackNames((), np.zeros((0, 3)), add_kitchen(spec, kitchen, (stance.x, stance.y)))
         _add_kitchen_onlooker(spec, kitchen, stance)
     else:
         people = _add_terrain(spec, config, seed)

@@ -1,16 +1,19 @@
-"""Where the fasteners of a real pack are: 84 on two levels, nuts among screws, a dented end, and nine holes."""
+"""A real pack: 84 fasteners on two levels, nuts among screws, a dented end, nine holes, and the cover around them."""
 
 from __future__ import annotations
 
 import csv
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 from typing import NamedTuple
 
+import mujoco
 import numpy as np
 
 from golem.robots.worlds.layout import KINDS, Kind, PackLayout, TrayPlace
+from golem.robots.worlds.pack_part import COVER, Rectangle, add_hole, add_legs, add_slab, square, without
 from golem.types import Array, PlanarPose
 
 RIM = 0.857
@@ -28,6 +31,10 @@ _TRAYS: tuple[tuple[str, Kind, tuple[float, float, float]], ...] = (
     ("tray_right_nuts", "nut", (0.45, -0.90, -np.pi / 2)),
 )
 """Name, kind, and x, y, yaw in the pack frame of trays on the right of who works at each edge [m, rad]."""
+FRAME = (0.03, 1.20)
+"""x at which the widest rectangle is cut in three, so that holes of the long edges split nothing but these [m]."""
+HOLE = 0.003
+"""Radius of a hole without a fastener [m]."""
 
 
 class Ioniq5Data(NamedTuple):
@@ -101,3 +108,28 @@ class Ioniq5Layout(PackLayout):
     def around(self, reach_y: float) -> list[int]:
         """Return all places."""
         return list(range(len(self.fasteners())))
+
+
+def add_cover(spec: mujoco.MjSpec, body: mujoco.MjsBody, layout: Ioniq5Layout, loose: Mapping[int, float]) -> None:
+    """Add to the pack's `body` all that is no fastener; `loose`: radius of the bore or stud by loosened place [m]."""
+    spots = layout.fasteners()
+    bores = {slot: radius for slot, radius in loose.items() if layout.kind(slot) != "nut"}
+    gone = [slot for slot in layout.empty_holes if layout.kind(slot) != "nut"]
+    holes: list[tuple[str, Array, float, bool]] = [(f"{s:02d}", spots[s], bores[s], False) for s in bores]
+    holes += [(f"{s:02d}", spots[s], HOLE, True) for s in gone]
+    holes += [(f"free_{k}", at, HOLE, True) for k, at in enumerate(layout.holes())]
+    for name, at, radius, closed in holes:
+        add_hole(spec, body, name, at, radius, closed=closed)
+    window: Rectangle = (*layout.window_x, *layout.window_y)
+    for x0, x1, y0, y1, top in ioniq5_data().cover:
+        marks = [x0, *(x for x in FRAME if x0 < x < x1 and x1 - x0 > 1.2), x1]
+        cuts = [square(at) for _, at, _, _ in holes if at[2] == top]
+        for part in zip(marks[:-1], marks[1:], strict=True):
+            for xs, ys in without((*part, y0, y1), [*cuts, window]):
+                add_slab(body, xs, ys, top)
+        if top == 0.0:
+            for xs, ys in without((x0, x1, y0, y1), [window]):
+                add_slab(body, xs, ys, -COVER, layout.thickness - COVER, "aluminium")
+    floor = layout.window_depth + 0.02
+    add_slab(body, layout.window_x, layout.window_y, -floor, layout.thickness - floor, "aluminium")
+    add_legs(body, layout)

@@ -25,12 +25,10 @@ _BOX = mujoco.mjtGeom.mjGEOM_BOX
 _CYLINDER = mujoco.mjtGeom.mjGEOM_CYLINDER
 
 
-def add_meshes(spec: mujoco.MjSpec) -> tuple[str, str]:
-    """Add and name the meshes of tight nuts and their washers."""
-    return (
-        parts.add_mesh(spec, "nut", *parts.hexagon(0.010, 0.006)),
-        parts.add_mesh(spec, "washer", *parts.lathe([(0.0085, 0.0), (0.0085, 0.0012)], sides=24)),
-    )
+def add_meshes(spec: mujoco.MjSpec) -> None:
+    """Add the meshes of tight nuts and their washers."""
+    parts.add_mesh(spec, "nut", *parts.hexagon(0.010, 0.006))
+    parts.add_mesh(spec, "washer", *parts.lathe([(0.0085, 0.0), (0.0085, 0.0012)], sides=24))
 
 
 def add_bare(body: mujoco.MjsBody, seat: Sequence[float]) -> None:
@@ -40,11 +38,11 @@ def add_bare(body: mujoco.MjsBody, seat: Sequence[float]) -> None:
     parts.collider(body, _CYLINDER, size, pos)
 
 
-def add_tight(body: mujoco.MjsBody, meshes: tuple[str, str], seat: Sequence[float], label: str) -> PackPart:
+def add_tight(body: mujoco.MjsBody, seat: Sequence[float], label: str) -> PackPart:
     """Add a tight nut on its stud at `seat` (3,) in the frame of the pack's `body`; its part is in that frame."""
     x, y, base = seat
-    parts.visual_mesh(body, meshes[1], (x, y, base), material="steel", name=f"{label}_washer")
-    parts.visual_mesh(body, meshes[0], (x, y, base + 0.0012), material="zinc", name=f"{label}_hex")
+    parts.visual_mesh(body, "washer", (x, y, base), material="steel", name=f"{label}_washer")
+    parts.visual_mesh(body, "nut", (x, y, base + 0.0012), material="zinc", name=f"{label}_hex")
     parts.visual(body, _CYLINDER, (0.003, 0.006), (x, y, base + 0.006), material="steel", name=f"{label}_stud")
     parts.collider(body, _CYLINDER, (0.0055, 0.006), (x, y, base + 0.006))
     geoms = (f"{label}_washer", f"{label}_hex", f"{label}_stud")

@@ -13,8 +13,8 @@ import mujoco
 import numpy as np
 
 from golem.errors import ConfigError
-from golem.robots.worlds import hall, ioniq5_cover, nuts, parts, screws, tray
-from golem.robots.worlds.ioniq5 import Ioniq5Layout
+from golem.robots.worlds import hall, nuts, parts, screws, tray
+from golem.robots.worlds.ioniq5 import Ioniq5Layout, add_cover
 from golem.robots.worlds.layout import PackLayout, yaw_quat
 from golem.robots.worlds.pack_part import COVER, PackPart, Span, add_hole, add_legs, add_slab, square, without
 from golem.robots.worlds.screws import ScrewDraw
@@ -35,13 +35,11 @@ class PackNames:
     Attributes:
         screws: names of the loosened screws' bodies (free joint of the same name), in the order of the draws.
         mouths: (n, 3) centres of their bores' mouths in the world [m].
-        tray: name of the tray's body.
         parts: everything the detector knows, loosened screws included.
     """
 
     screws: tuple[str, ...]
     mouths: Array
-    tray: str
     parts: tuple[PackPart, ...]
 
 
@@ -92,13 +90,13 @@ def add_pack(
     body = spec.worldbody.add_body(name="pack", pos=T[:3, 3].tolist(), quat=yaw_quat(layout.yaw))
     loose = {draw.slot: draw.bore_radius for draw in draws}
     if isinstance(layout, Ioniq5Layout):
-        ioniq5_cover.add_cover(spec, body, layout, loose)
+        add_cover(spec, body, layout, loose)
     else:
         _add_stand(body, layout)
         _add_rim(spec, body, layout, loose | dict.fromkeys(layout.empty_holes, 0.003))
-    meshes = nuts.add_meshes(spec)
-    found = _add_window(body, layout, meshes)
-    found += _add_fasteners(spec, body, layout, set(slots), meshes)
+    nuts.add_meshes(spec)
+    found = _add_window(body, layout)
+    found += _add_fasteners(spec, body, layout, set(slots))
     for draw in draws:
         (nuts.add_stud if draw.kind == "nut" else screws.add_bore)(body, draw, spots[draw.slot])
     for draw in draws:
@@ -116,7 +114,7 @@ def add_pack(
         geoms = tuple(f"{place.name}_part_{k}" for k in range(5)) + tuple(f"{place.name}_rim_{k}" for k in range(4))
         found.append(PackPart("tray", place.name, geoms, place.pose()[:3, 3], np.array(layout.tray_size)))
     mouths = np.array([spots[s] for s in slots]).reshape(-1, 3)
-    return PackNames(tuple(d.name for d in draws), mouths @ T[:3, :3].T + T[:3, 3], "tray", tuple(found))
+    return PackNames(tuple(d.name for d in draws), mouths @ T[:3, :3].T + T[:3, 3], tuple(found))
 
 
 def _add_stand(body: mujoco.MjsBody, layout: PackLayout) -> None:
@@ -193,8 +191,8 @@ def _strip(body: mujoco.MjsBody, xs: Span, ys: Span, holes: Sequence[tuple[float
         add_slab(body, *piece)
 
 
-def _add_window(body: mujoco.MjsBody, layout: PackLayout, meshes: tuple[str, str]) -> list[PackPart]:
-    """Add modules, bus bars and nuts, of `nuts.add_meshes`, in the opened section; places are in the pack frame."""
+def _add_window(body: mujoco.MjsBody, layout: PackLayout) -> list[PackPart]:
+    """Add modules, bus bars and nuts in the opened section; places are in the pack frame."""
     (x0, x1), (y0, y1), depth = layout.window_x, layout.window_y, layout.window_depth
     floor = -depth
     cx, cy, hx, hy = (x0 + x1) / 2, (y0 + y1) / 2, (x1 - x0) / 2, (y1 - y0) / 2
@@ -233,15 +231,13 @@ def _add_window(body: mujoco.MjsBody, layout: PackLayout, meshes: tuple[str, str
                     continue
                 bx = x0 + (0.27 + 0.46 * row) * (x1 - x0) + offset
                 name = f"bus_bar_{row}{col}{k}"
-                found += _add_bus_bar(body, (bx, by, top), name, meshes, along=1)
+                found += _add_bus_bar(body, (bx, by, top), name, along=1)
     bx, by = cx, start + pitch * (columns - 0.5)
-    found += _add_bus_bar(body, (bx, by, top), "bus_bar_link", meshes, along=0)
+    found += _add_bus_bar(body, (bx, by, top), "bus_bar_link", along=0)
     return found
 
 
-def _add_bus_bar(
-    body: mujoco.MjsBody, pos: tuple[float, float, float], name: str, meshes: tuple[str, str], *, along: int
-) -> list[PackPart]:
+def _add_bus_bar(body: mujoco.MjsBody, pos: tuple[float, float, float], name: str, *, along: int) -> list[PackPart]:
     """Add one bar with an orange sleeve, a nut on a stud at each end, and their colliders."""
     half = STUD_PITCH / 2 + 0.016
     x, y, z = pos
@@ -257,13 +253,11 @@ def _add_bus_bar(
     for end in (-1, 1):
         nx, ny = (x, y + end * STUD_PITCH / 2) if along else (x + end * STUD_PITCH / 2, y)
         label = f"nut_{name[8:]}_{'b' if end > 0 else 'a'}"
-        found.append(nuts.add_tight(body, meshes, (nx, ny, z + thick), label))
+        found.append(nuts.add_tight(body, (nx, ny, z + thick), label))
     return found
 
 
-def _add_fasteners(
-    spec: mujoco.MjSpec, body: mujoco.MjsBody, layout: PackLayout, loose: set[int], meshes: tuple[str, str]
-) -> list[PackPart]:
+def _add_fasteners(spec: mujoco.MjSpec, body: mujoco.MjsBody, layout: PackLayout, loose: set[int]) -> list[PackPart]:
     """Add the tight fasteners and list the empty holes; where they are is in the pack frame."""
     flats, height = FASTENER_HEAD
     head = parts.add_mesh(spec, "fastener_hex", *parts.hexagon(flats, height))
@@ -280,7 +274,7 @@ def _add_fasteners(
             if slot in layout.empty_holes:
                 nuts.add_bare(body, at)
             else:
-                found.append(nuts.add_tight(body, meshes, at, f"nut_{slot:02d}"))
+                found.append(nuts.add_tight(body, at, f"nut_{slot:02d}"))
         elif slot in layout.empty_holes:
             found.append(PackPart("screw_hole", "pack", (), at, np.array([0.006, 0.006, 0.0])))
         else:

@@ -64,12 +64,14 @@ def without(rectangle: Rectangle, cuts: Sequence[Rectangle]) -> list[tuple[Span,
     return pieces
 
 
-def add_slab(body: mujoco.MjsBody, xs: Span, ys: Span, top: float = 0.0) -> None:
-    """Add one piece of cover or ledge, seen and colliding, from its extent in x and y and the height of its top."""
-    size = ((xs[1] - xs[0]) / 2, (ys[1] - ys[0]) / 2, COVER / 2)
-    pos = ((xs[0] + xs[1]) / 2, (ys[0] + ys[1]) / 2, top - COVER / 2)
+def add_slab(
+    body: mujoco.MjsBody, xs: Span, ys: Span, top: float = 0.0, thick: float = COVER, material: str = "cover_coat"
+) -> None:
+    """Add one piece of a pack, seen and colliding, from its extent in x and y, the height of its top, and below."""
+    size = ((xs[1] - xs[0]) / 2, (ys[1] - ys[0]) / 2, thick / 2)
+    pos = ((xs[0] + xs[1]) / 2, (ys[0] + ys[1]) / 2, top - thick / 2)
     parts.collider(body, _BOX, size, pos)
-    parts.visual(body, _BOX, size, pos, material="cover_coat")
+    parts.visual(body, _BOX, size, pos, material=material)
 
 
 def add_hole(

@@ -42,7 +42,7 @@ class RandomPack(RandomScene):
         bores = tuple(Bore(mouth, draw.bore_radius, draw.name) for draw, mouth in pairs)
         tops = {draw.name: draw.head_height for draw in draws}
         super().__init__(world, names.parts, bores, tops)
-        self.layout, self.tray, self.draws = layout, names.tray, draws
+        self.layout, self.tray, self.draws = layout, "tray", draws
 
     def randomise_looks(self, rng: np.random.Generator) -> Conditions:
         """Draw finishes, colours of materials, robot and distractors, and the lights; see `RandomScene`."""

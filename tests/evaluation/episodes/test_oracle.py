@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from tests.robots.worlds.test_ioniq5 import build
 
-from golem.evaluation.episodes.whereabouts import counted, whereabouts
+from golem.evaluation.episodes.oracle import counted, whereabouts
 
 
 def test_where_each_fastener_is_is_known_and_counted_by_kind() -> None:
