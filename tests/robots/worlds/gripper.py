@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
 
-from golem.robots.worlds import screws
+from golem.robots.worlds import nuts, screws
 from golem.robots.worlds.pack import set_contact_options
 from golem.robots.worlds.screws import ScrewDraw
 
@@ -42,6 +42,12 @@ def nominal(friction: float, **changes: float) -> ScrewDraw:
     return ScrewDraw(slot=0, friction=friction, hexagonal=False, **{**values, **changes})
 
 
+def nominal_nut(friction: float, **changes: float) -> ScrewDraw:
+    """Return an M6 flange nut with 6 mm of its height on the stud."""
+    values = {"shank_length": 0.012, "head_diameter": 0.013, "mass": 0.006, **changes}
+    return replace(nominal(friction, **values), kind="nut")
+
+
 def build(draw: ScrewDraw) -> mujoco.MjModel:
     """Return a plate with one bore and its screw, and a hand of two pads around the head, on a soft wrist."""
     spec = mujoco.MjSpec()
@@ -50,8 +56,8 @@ def build(draw: ScrewDraw) -> mujoco.MjModel:
     for name in ("zinc", "steel"):
         spec.add_material(name=name)
     plate = spec.worldbody.add_body(name="plate")
-    screws.add_bore(plate, draw, (0, 0, 0))
-    screws.add_screw(spec, draw, (0, 0, 0), np.eye(4))
+    (nuts.add_stud if draw.kind == "nut" else screws.add_bore)(plate, draw, (0, 0, 0))
+    (nuts.add_nut if draw.kind == "nut" else screws.add_screw)(spec, draw, (0, 0, 0), np.eye(4))
     height = draw.protrusion + draw.head_height / 2
     spec.worldbody.add_body(name="anchor", mocap=True, pos=[0, 0, height])
     hand = spec.worldbody.add_body(name="hand", pos=[0, 0, height], gravcomp=1)
@@ -91,7 +97,7 @@ def pull(draw: ScrewDraw, tilt: float, azimuth: float = 0.0) -> Pull:
     start = data.mocap_pos[0].copy()
     line = np.array([np.sin(tilt) * np.cos(azimuth), np.sin(tilt) * np.sin(azimuth), np.cos(tilt)])
     close, rise = 400, 2000
-    screw = model.body("screw_00").id
+    screw = model.body(draw.name).id
     hand = model.body("hand").id
     before = data.xpos[screw].copy()
     for k in range(close + rise + 300):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tests.robots.worlds.gripper import nominal, pull
+from tests.robots.worlds.gripper import nominal, nominal_nut, pull
 
 
 @pytest.mark.parametrize(("friction", "tilt"), [(0.6, 0.0), (0.35, 10.0), (0.15, 20.0)])
@@ -19,3 +19,9 @@ def test_jam(friction: float, tilt: float, clearance: float) -> None:
     result = pull(nominal(friction, clearance=clearance), np.deg2rad(tilt))
     assert result.rise < 0.003
     assert result.slip > 0.010
+
+
+def test_a_nut_comes_off_askew_and_jams_far_askew() -> None:
+    assert pull(nominal_nut(0.6), np.deg2rad(30.0)).rise > 0.02
+    jammed = pull(nominal_nut(0.6), np.deg2rad(55.0))
+    assert jammed.rise < 0.003 and jammed.slip > 0.010
