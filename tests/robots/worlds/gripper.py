@@ -39,7 +39,7 @@ def nominal(friction: float, **changes: float) -> ScrewDraw:
         "clearance": 0.0003, "protrusion": 0.006, "tilt": 0.0, "tilt_azimuth": 0.0, "shank_diameter": 0.006,
         "shank_length": 0.020, "head_diameter": 0.012, "head_height": 0.006, "mass": 0.02,
     }  # fmt: skip
-    return ScrewDraw(slot=0, friction=friction, hexagonal=False, **{**values, **changes})
+    return ScrewDraw(slot=0, friction=friction, hexagonal=False, kind="screw", **{**values, **changes})
 
 
 def nominal_nut(friction: float, **changes: float) -> ScrewDraw:

@@ -38,11 +38,13 @@ def claimed_list(
     """Return what a gantry would claim of a pack whose places `gone` hold nothing; `T_list_world` is (4, 4)."""
     T, rows = T_list_world @ layout.pose(), list[tuple[Kind, Array]]()
     for slot, spot in enumerate(layout.fasteners()):
-        luck, noise, kind = rng.random(5), rng.normal(size=3) * errors.place, layout.kind(slot)
+        luck, noise = rng.random(5), rng.normal(size=3) * errors.place
+        kind: Kind = layout.kind(slot)
         if slot in gone or luck[0] < errors.missed:
             continue
         if luck[1] < errors.kind:
-            kind = [other for other in KINDS if other != kind][int(2 * luck[2])]
+            others: list[Kind] = [other for other in KINDS if other != kind]
+            kind = others[int(2 * luck[2])]
         at = (T @ (*spot, 1.0))[:3] + noise
         rows.append((kind, at))
         if luck[3] < errors.double:

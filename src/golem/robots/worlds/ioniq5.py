@@ -51,7 +51,7 @@ def ioniq5_data() -> Ioniq5Data:
     """Return the rows of the file; it says what they mean."""
     text = files(__package__ or "").joinpath("ioniq5.csv").read_text(encoding="utf-8")
     rows = [(row[0], [float(x) for x in row[1:]]) for row in csv.reader(text.splitlines()) if row[0][0] != "#"]
-    kinds = tuple(known for kind, _ in rows for known in KINDS if kind == known)
+    kinds: tuple[Kind, ...] = tuple(known for kind, _ in rows for known in KINDS if kind == known)
     fasteners, holes, cover = (
         np.array([row for kind, row in rows if kind in wanted]) for wanted in (KINDS, ("hole",), ("cover",))
     )

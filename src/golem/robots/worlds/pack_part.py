@@ -41,7 +41,7 @@ class PackPart:
     size: Array
 
 
-def square(hole: Sequence[float]) -> Rectangle:
+def square(hole: Sequence[float] | Array) -> Rectangle:
     """Return what a hole at x, y takes out of the cover."""
     x, y = hole[:2]
     return x - HOLE_CELL, x + HOLE_CELL, y - HOLE_CELL, y + HOLE_CELL
@@ -74,9 +74,7 @@ def add_slab(
     parts.visual(body, _BOX, size, pos, material=material)
 
 
-def add_hole(
-    spec: mujoco.MjSpec, body: mujoco.MjsBody, name: str, at: Sequence[float], radius: float, *, closed: bool
-) -> None:
+def add_hole(spec: mujoco.MjSpec, body: mujoco.MjsBody, name: str, at: Array, radius: float, *, closed: bool) -> None:
     """Fill the square of `HOLE_CELL` around `at` (3,) with a holed plate; where `closed`, nothing falls in."""
     x, y, z = at
     plate = parts.add_mesh(spec, f"hole_plate_{name}", *parts.holed_plate(HOLE_CELL, radius, 0.022))
