@@ -59,10 +59,6 @@ NOWHERE_TO_WORK = (PickOutcome.OUT_OF_REACH, PickOutcome.TRAY_MISSING, PickOutco
 """What a pick says of a robot that stands where it cannot work."""
 
 
-PLANT = {"pack": "plant", "ioniq5": "ioniq5_plant"}
-"""Where a robot walks to a pack."""
-
-
 @dataclass(frozen=True)
 class VarStandOptions(PickOptions):
     """The work place, and how the robot comes to it."""
@@ -124,7 +120,7 @@ class VarStandRung(PickRung):
             layout=self.options.layout,
             conditions=conditions,
             stance=[stance.x, stance.y, stance.yaw],
-            world=PLANT[self.options.world] if walks else self.options.world,
+            world={"pack": "plant", "ioniq5": "ioniq5_plant"}[self.options.world] if walks else self.options.world,
             obstacles=self.options.obstacles if walks else 0,
         )
         with TemporaryDirectory() as folder:

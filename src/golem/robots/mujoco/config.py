@@ -17,10 +17,8 @@ World = Literal[
     "pack", "ioniq5", "plant", "ioniq5_plant",
     "open", "slope", "step", "rubble", "furnished", "corridor", "kitchen", "counter",
 ]  # fmt: skip
-IONIQ5 = ("ioniq5", "ioniq5_plant")
-"""Worlds with the real pack."""
-PLANTS = ("plant", "ioniq5_plant")
-"""Worlds with a pack in a furnished hall."""
+IONIQ5, PLANTS = ("ioniq5", "ioniq5_plant"), ("plant", "ioniq5_plant")
+"""Worlds with the real pack, and those with a pack in a furnished hall."""
 WITH_PACK = ("pack", *PLANTS, "ioniq5")
 """Worlds with a pack to work on."""
 KITCHENS = ("kitchen", "counter")

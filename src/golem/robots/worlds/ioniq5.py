@@ -18,23 +18,19 @@ from golem.types import Array, PlanarPose
 
 RIM = 0.857
 """Height of the rim over the floor on which the robot stands, at the condition `height` 0 [m]."""
-LONG_EDGES = (0.145, 1.092)
-"""x of the trays along the long edges, in the pack frame [m]."""
 _TRAYS: tuple[tuple[str, Kind, tuple[float, float, float]], ...] = (
-    ("tray", "screw", (LONG_EDGES[0], -0.28, 0.0)),
-    ("tray_nuts", "nut", (LONG_EDGES[0], -0.55, 0.0)),
+    ("tray", "screw", (0.145, -0.28, 0.0)),
+    ("tray_nuts", "nut", (0.145, -0.55, 0.0)),
     ("tray_left", "screw", (0.45, 0.81, np.pi / 2)),
     ("tray_left_nuts", "nut", (0.72, 0.81, np.pi / 2)),
-    ("tray_far", "screw", (LONG_EDGES[1], 0.28, np.pi)),
-    ("tray_far_nuts", "nut", (LONG_EDGES[1], 0.55, np.pi)),
+    ("tray_far", "screw", (1.092, 0.28, np.pi)),
+    ("tray_far_nuts", "nut", (1.092, 0.55, np.pi)),
     ("tray_right", "screw", (0.72, -0.90, -np.pi / 2)),
     ("tray_right_nuts", "nut", (0.45, -0.90, -np.pi / 2)),
 )
 """Name, kind, and x, y, yaw in the pack frame of trays on the right of who works at each edge [m, rad]."""
 FRAME = (0.03, 1.20)
 """x at which the widest rectangle is cut in three, so that holes of the long edges split nothing but these [m]."""
-HOLE = 0.003
-"""Radius of a hole without a fastener [m]."""
 
 
 class Ioniq5Data(NamedTuple):
@@ -75,12 +71,12 @@ class Ioniq5Layout(PackLayout):
     def trays(self) -> tuple[TrayPlace, ...]:
         """Return all trays: where the first is moved or turned from its place, each is on its own.
 
-        Where the first is on the robot's left, those along the long edges are mirrored.
+        Where the first is on the robot's left, those along the long edges, nearer to its middle, are mirrored.
         """
         pack = PlanarPose(self.near_edge, self.center_y, self.yaw)
         first = pack.to(PlanarPose(*self.tray_xy, self.tray_yaw))
         side = -1.0 if first.y > 0.0 else 1.0
-        homes = [PlanarPose(x, y * (side if x in LONG_EDGES else 1.0), yaw) for _, _, (x, y, yaw) in _TRAYS]
+        homes = [PlanarPose(x, y * (side if abs(y) < 0.6 else 1.0), yaw) for _, _, (x, y, yaw) in _TRAYS]
         moved = homes[0].to(first)
         places = [pack @ home @ moved for home in homes]
         return tuple(
@@ -113,11 +109,10 @@ class Ioniq5Layout(PackLayout):
 def add_cover(spec: mujoco.MjSpec, body: mujoco.MjsBody, layout: Ioniq5Layout, loose: Mapping[int, float]) -> None:
     """Add to the pack's `body` all that is no fastener; `loose`: radius of the bore or stud by loosened place [m]."""
     spots = layout.fasteners()
-    bores = {slot: radius for slot, radius in loose.items() if layout.kind(slot) != "nut"}
-    gone = [slot for slot in layout.empty_holes if layout.kind(slot) != "nut"]
-    holes: list[tuple[str, Array, float, bool]] = [(f"{s:02d}", spots[s], bores[s], False) for s in bores]
-    holes += [(f"{s:02d}", spots[s], HOLE, True) for s in gone]
-    holes += [(f"free_{k}", at, HOLE, True) for k, at in enumerate(layout.holes())]
+    places = {**loose, **dict.fromkeys(layout.empty_holes, 0.003)}
+    bored = [(s, radius) for s, radius in places.items() if layout.kind(s) != "nut"]
+    holes: list[tuple[str, Array, float, bool]] = [(f"{s:02d}", spots[s], r, s not in loose) for s, r in bored]
+    holes += [(f"free_{k}", at, 0.003, True) for k, at in enumerate(layout.holes())]
     for name, at, radius, closed in holes:
         add_hole(spec, body, name, at, radius, closed=closed)
     window: Rectangle = (*layout.window_x, *layout.window_y)

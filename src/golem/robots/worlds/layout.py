@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -23,8 +23,7 @@ Kind = Literal["screw", "nut", "bolt"]
 KINDS: tuple[Kind, ...] = ("screw", "nut", "bolt")
 
 
-@dataclass(frozen=True, slots=True)
-class TrayPlace:
+class TrayPlace(NamedTuple):
     """A tray: its body's `name`, the `kind` of fasteners it is for, and its underside's middle and heading [m, rad]."""
 
     name: str

@@ -16,10 +16,8 @@ from golem.robots.worlds.pack_part import PackPart
 from golem.robots.worlds.screws import SOLREF, ScrewDraw, loosened
 from golem.types import Array
 
-FLATS = 0.8
-"""Width across flats per diameter of the flange."""
-COLLAR = 0.0042
-"""Radius of what a loosened nut stands on [m]."""
+FLATS, COLLAR = 0.8, 0.0042
+"""Width across flats per diameter of the flange; radius of what a loosened nut stands on [m]."""
 
 _BOX = mujoco.mjtGeom.mjGEOM_BOX
 _CYLINDER = mujoco.mjtGeom.mjGEOM_CYLINDER
@@ -80,6 +78,6 @@ def add_nut(
         ("flange", 24, [(flange, 0.0), (flange, 0.0012), (flange * 0.82, 0.002), (inner, 0.002)]),
     ):
         ring = [(inner, 0.0), *profile, (inner, 0.0)]
-        mesh = parts.add_mesh(spec, f"{name}_{part}", *parts.lathe(ring, sides, closed=False))
+        mesh = parts.add_mesh(spec, f"{name}_{part}", *parts.lathe(ring, sides))
         parts.visual_mesh(body, mesh, material="zinc", name=f"{name}_{part}")
     return name

@@ -91,18 +91,18 @@ def add_mesh(spec: mujoco.MjSpec, name: str, vertices: Array, faces: Faces) -> s
     return name
 
 
-def lathe(profile: Sequence[tuple[float, float]], sides: int = 20, *, closed: bool = True) -> tuple[Array, Faces]:
+def lathe(profile: Sequence[tuple[float, float]], sides: int = 20) -> tuple[Array, Faces]:
     """Revolve (radius, height) points, given from bottom to top, about z; the ends are closed where radius > 0.
 
-    Not `closed`, they are left open: for a ring, whose last point is its first.
+    A profile that ends where it began makes a ring.
 
     Returns:
         vertices (n, 3) [m] and triangles (m, 3), outward facing.
     """
-    points = np.asarray(profile, dtype=float)
-    if closed and points[0, 0] > 0:
+    points, round_again = np.asarray(profile, dtype=float), profile[0] == profile[-1]
+    if not round_again and points[0, 0] > 0:
         points = np.vstack([[0.0, points[0, 1]], points])
-    if closed and points[-1, 0] > 0:
+    if not round_again and points[-1, 0] > 0:
         points = np.vstack([points, [0.0, points[-1, 1]]])
     angle = np.linspace(0.0, 2 * np.pi, sides, endpoint=False)
     ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)

@@ -51,10 +51,7 @@ class ScrewRanges:
     mass: tuple[float, float] = (0.015, 0.030)
 
     def of(self, kind: Kind) -> ScrewRanges:
-        """Return the ranges of another kind of fastener with the same friction, clearance and tilt; assumed.
-
-        M6 flange nuts: the shank is the stud above its seat, the protrusion how far the nut has come up. An M8 bolt.
-        """
+        """Return those of M6 flange nuts, whose shank is the stud above its seat, or of an M8 bolt; assumed."""
         if kind == "nut":
             low, high = self.protrusion
             return replace(
