@@ -13,7 +13,7 @@ from golem.evaluation.episodes.episode import Loss, episode_seed
 from golem.evaluation.episodes.oracle import GraspTruth, Oracle
 from golem.evaluation.episodes.pick_blame import PAD_REACH, STRAIGHT, blame
 from golem.evaluation.rungs import pick_screw as pick
-from golem.evaluation.rungs.pick_screw import StandRung, TetherRung
+from golem.evaluation.rungs.pick_screw import PickOptions, StandRung, TetherRung
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.runtime.lockstep import build
 from golem.stack import load_stack
@@ -58,6 +58,12 @@ def test_a_perfect_robot_puts_the_screw_in_the_tray(method: str, rung: TetherRun
     assert 1.0 < outcome.timings["detect_to_grasp"] < 15.0
     assert outcome.series["grasp_miss"] < PAD_REACH
     assert outcome.picture is not None and outcome.picture.startswith(b"\x89PNG")
+
+
+@pytest.mark.slow
+def test_a_screw_of_the_real_pack_is_picked_at_its_real_height() -> None:
+    outcome = TetherRung(PickOptions(world="ioniq5")).run(spec(), None)
+    assert outcome.success, outcome.detail
 
 
 def test_a_robot_whose_legs_carry_nothing_does_not_pick_in_its_band() -> None:
