@@ -105,7 +105,8 @@ def _is_coco(path: Path) -> bool:
     try:
         data = _load(path)
     except (OSError, ValueError, RecursionError):
-        return path.name.endswith(".coco.json") or path.name.startswith("instances")
+        named = path.name.endswith(".coco.json") or path.name.startswith("instances")
+        return named or not any(path.parent.rglob("*.txt"))  # a damaged file, unless labels are in YOLO's format
     return isinstance(data, dict) and "images" in data and ("annotations" in data or "categories" in data)
 
 
