@@ -17,7 +17,7 @@ from golem.robots.mujoco.engine import MujocoRobot
 from golem.run import Narrator, on_air, shown
 from golem.runtime.lockstep import LockstepRunner, build
 from golem.skills.base import SkillResult
-from golem.skills.disassemble import DisassembleGoal
+from golem.skills.disassemble_goal import DisassembleGoal
 from golem.skills.navigate import NavigateGoal
 from golem.stack import load_stack
 

@@ -13,7 +13,8 @@ from golem.middleware.bus import Bus
 from golem.robots.model.kinematics import Kinematics
 from golem.skills.base import SkillResult
 from golem.skills.context import Context
-from golem.skills.disassemble import Disassemble, DisassembleGoal
+from golem.skills.disassemble import Disassemble
+from golem.skills.disassemble_goal import DisassembleGoal
 from golem.skills.dock import Dock, DockGoal, DockReport
 from golem.skills.pick import Pick
 from golem.skills.pick_config import PickGoal

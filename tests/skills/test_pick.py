@@ -436,7 +436,7 @@ def test_what_is_to_be_avoided_is_tried_only_where_there_is_no_other(world: Any,
 
 def test_places_to_avoid_are_pairs_of_numbers() -> None:
     for wrong in ((0.4,), (0.4, float("nan"))):
-        with pytest.raises(ConfigError, match="a pick is to avoid are pairs of finite numbers"):
+        with pytest.raises(ConfigError, match="places of a pick are pairs of finite numbers"):
             PickGoal(avoid=wrong)
 
 

@@ -1,14 +1,20 @@
-"""Working along a pack: dock, pick, and dock again where a pick says that nothing more is within reach."""
+"""Taking a pack apart: a whole one by a list of its fasteners, or what is found within reach of a stance or two."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
+from pathlib import Path
 
-from golem.options import require
-from golem.skills.base import SkillResult
+from golem.errors import ConfigError
+from golem.skills.base import SkillResult, StageFailed
 from golem.skills.context import Context
-from golem.skills.dock import DockGoal, DockReport
-from golem.skills.pick_config import PickGoal
+from golem.skills.disassemble_goal import DisassembleGoal, DisassembleReport
+from golem.skills.dock import DockReport
+from golem.skills.fastener_list import read_list
+from golem.skills.inventory import write_inventory
+from golem.skills.job_file import JobFile
+from golem.skills.kept_file import KeptFileConfig
+from golem.skills.pack_job import PackJob
 from golem.skills.pick_report import PickOutcome, PickReport, Sight
 
 LEFT = (PickOutcome.TIGHT, PickOutcome.JAMMED, PickOutcome.SLIPPED, PickOutcome.NOTHING_THERE)
@@ -17,59 +23,56 @@ AGAIN = (*LEFT, PickOutcome.OUT_OF_REACH, PickOutcome.BLOCKED, PickOutcome.TRAY_
 """What a pick says where another stance may help: others are within reach there, or it is free."""
 
 
-@dataclass(frozen=True, slots=True)
-class DisassembleGoal:
-    """What to take out.
-
-    Attributes:
-        count: objects to pick.
-        docks: how often the robot may look for another stance, the first time included; 0 stays where it is.
-        dock: how it docks.
-        pick: what it picks, with which hand.
-    """
-
-    count: int = 1
-    docks: int = 3
-    dock: DockGoal = field(default_factory=DockGoal)
-    pick: PickGoal = field(default_factory=lambda: PickGoal(side="either"))
-
-    def __post_init__(self) -> None:
-        require(
-            "goal of disassembling: ",
-            ("count", self.count, 1 <= self.count <= 100, "from 1 to 100"),
-            ("docks", self.docks, 0 <= self.docks <= 20, "from 0 to 20"),
-        )
-
-
-@dataclass
-class DisassembleReport:
-    """What was done.
-
-    Attributes:
-        picked: objects in the container.
-        docks: how the robot stood after every docking, in order.
-        picks: what every pick found out, in order.
-    """
-
-    picked: int = 0
-    docks: list[DockReport] = field(default_factory=list[DockReport])
-    picks: list[PickReport] = field(default_factory=list[PickReport])
+JOB = 4 * 3600.0
+"""Time that a job may take [s] [own: RAPID takes 24 minutes, a robot that stands longer]."""
 
 
 class Disassemble:
-    """Take fasteners out of a pack: dock, pick, and dock again where none is within reach any more.
+    """Take fasteners out of a pack: all of a list, by a plan and with a file that keeps what was done, or some.
 
-    Stages: those of `dock` and `pick`, and `done`.
+    Stages: those of `navigate`, `dock` and `pick`, and `plan`, `job`, `done`. Without a list it docks, picks, and docks
+    again where a pick says that nothing more is within reach.
     """
 
     Goal, Result = DisassembleGoal, DisassembleReport
 
+    def __init__(self, config: KeptFileConfig | None = None) -> None:
+        """Find lists and keep jobs in the folder of `config`."""
+        self._folder = Path((config or KeptFileConfig()).folder)
+
     def timeout(self, goal: DisassembleGoal) -> float:
         """Return the time it may take [s]; see `Skill`."""
-        return 180.0 * (goal.docks + 1) + 120.0 * (goal.count + goal.docks)
+        some = 180.0 * (goal.docks + 1) + 120.0 * (goal.count + goal.docks)
+        return JOB if goal.list or goal.job else some
 
     async def run(self, context: Context, goal: DisassembleGoal) -> SkillResult:
-        """Go along the pack; see `Skill`."""
+        """Take out what is asked for; see `Skill`."""
+        return await (self._job(context, goal) if goal.list or goal.job else self._some(context, goal))
+
+    async def _job(self, context: Context, goal: DisassembleGoal) -> SkillResult:
+        """Begin a job or go on with it; however it ends, the inventory is written."""
+        if context.legs.reporting and context.legs.status.speed == 0.0:
+            raise ConfigError(
+                f"The legs, '{context.legs.status.controller}', do not walk; choose others, such as almi."
+            )
+        listed = read_list(self._folder / goal.list, {*goal.screws, *goal.nuts}) if goal.list else ()
+        path = self._folder / (goal.job or f"{goal.list.removesuffix('.csv')}.sqlite")
+        if path.is_symlink():
+            raise ConfigError(f"'{path}' is a link; choose another name.")
+        book = await context.think(lambda: JobFile(path, listed), 0.0)
+        job = PackJob(context, goal, book)
+        try:
+            result = await job.run()
+        except StageFailed as failure:
+            result = SkillResult(False, failure.stage, failure.slot, str(failure), value=job.report)
+        finally:
+            job.report.fates = [one.fate.value for one in book.fasteners]
+            job.report.inventory = str(write_inventory(book))
+            book.close()
+        return result
+
+    async def _some(self, context: Context, goal: DisassembleGoal) -> SkillResult:
+        """Go along the pack."""
         start, report, docks = context.t, DisassembleReport(), goal.docks
         if docks:
             docked = await self._dock(context, goal, report)

@@ -39,35 +39,38 @@ class DockGoal:
         stance: `reach`: where the hands get to the fasteners that are seen, and to the container; `edge`: as
             `standoff` and `lateral` say, which also hold as long as no fastener is seen.
         standoff: distance from base_link to the edge [m].
-        lateral: where along the edge, from its middle, to the left [m].
+        lateral: where along the edge, from its middle, to the left [m]; None: where it comes from.
         tolerance: distance from the stance that is good enough [m]: a stop moves the robot by more than 1 cm.
         turned: the same of the heading [rad].
         approaches: how often it is tried.
         label, container: classes of the fasteners and of where they are put.
         avoid: x, y in odom of fasteners that are not wanted any more, one after the other [m].
+        wanted: x, y in odom of the only fasteners that are wanted, likewise; none: all.
     """
 
     stance: Literal["reach", "edge"] = "reach"
     standoff: float = 0.42
-    lateral: float = 0.0
+    lateral: float | None = 0.0
     tolerance: float = 0.03
     turned: float = 0.05
     approaches: int = 4
     label: str = "screw"
     container: str = "tray"
     avoid: tuple[float, ...] = ()
+    wanted: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         near, angle = "a positive distance of at most 0.2 m", "a positive angle of at most 0.5 rad"
         require(
             "goal of docking: ",
             ("standoff", self.standoff, 0.3 <= self.standoff <= 1.5, "from 0.3 to 1.5 m"),
-            ("lateral", self.lateral, abs(self.lateral) <= 1.0, "at most 1 m to either side"),
+            ("lateral", self.lateral, abs(self.lateral or 0.0) <= 1.0, "at most 1 m to either side"),
             ("tolerance", self.tolerance, 0.0 < self.tolerance <= 0.2, near),
             ("turned", self.turned, 0.0 < self.turned <= 0.5, angle),
             ("approaches", self.approaches, 1 <= self.approaches <= 10, "from 1 to 10"),
         )
-        floor_places("docking", self.avoid)
+        for places in (self.avoid, self.wanted):
+            floor_places("docking", places)
         if not (self.label and self.container):
             raise ConfigError("Docking names the class of the fasteners and that of their container.")
 
@@ -163,12 +166,13 @@ class Dock:
         context.legs.drive(Twist())
         await context.sleep(SETTLE)
         edge = await see_edge(context)
-        view = _View(edge.pose @ PlanarPose(-goal.standoff, goal.lateral, 0.0), edge)
         across = edge.pose.to(PlanarPose(0.0, 0.0, 0.0))
+        lateral = across.y if goal.lateral is None else goal.lateral
+        view = _View(edge.pose @ PlanarPose(-goal.standoff, lateral, 0.0), edge)
         if goal.stance == "reach" and -across.x < goal.standoff + IN_VIEW:
-            avoid = floor_places("docking", goal.avoid)
+            avoid, wanted = floor_places("docking", goal.avoid), floor_places("docking", goal.wanted)
             known = self._tray is not None
-            seen = await see_fasteners(context, goal.label, goal.container, avoid, not known)
+            seen = await see_fasteners(context, goal.label, goal.container, avoid, not known, wanted)
             tray, T = seen.tray, context.legs.pose
             if tray is not None:
                 self._tray = T[:3, :3] @ tray + T[:3, 3]

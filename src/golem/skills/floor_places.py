@@ -22,7 +22,7 @@ def floor_places(what: str, numbers: Sequence[float]) -> Array:
         ConfigError: they are no pairs, or not finite.
     """
     if len(numbers) % 2 or not all(map(math.isfinite, numbers)):
-        raise ConfigError(f"What {what} is to avoid are pairs of finite numbers, x and y of each place.")
+        raise ConfigError(f"The places of {what} are pairs of finite numbers, x and y of each place.")
     return np.array(numbers, float).reshape(-1, 2)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from golem.skills.base import StageFailed
 from golem.skills.context import Context
 from golem.skills.floor_places import stands_at
 from golem.skills.pick_targets import TORSO
+from golem.skills.pick_targets import WANTED as NEAR
 from golem.skills.planned_motion import PlannedMotion
 from golem.skills.stance_choice import LOOK_TURN
 from golem.types import Array, LocalizedObject, PlanarPose
@@ -80,10 +81,16 @@ async def see_edge(context: Context) -> NearEdge:
     edge = near_edge(local[side], PlanarPose(0.0, 0.0, 0.0))
     if isinstance(edge, str):
         raise StageFailed("look", "dock", edge)
-    return edge
+    return replace(edge, height=top)
 
 
-async def see_fasteners(context: Context, label: str, container: str, avoid: Array, around: bool) -> SeenFasteners:
+NOTHING: Array = np.zeros((0, 2))
+"""No places on the floor."""
+
+
+async def see_fasteners(
+    context: Context, label: str, container: str, avoid: Array, around: bool, wanted: Array = NOTHING
+) -> SeenFasteners:
     """Return what the head camera shows of fasteners and container; nothing where no frame comes.
 
     Args:
@@ -92,10 +99,11 @@ async def see_fasteners(context: Context, label: str, container: str, avoid: Arr
         container: class of the container.
         avoid: (n, 2) in odom, of fasteners that are left out [m].
         around: whether the torso turns to either side where fasteners are in view and no container is.
+        wanted: (n, 2) in odom, of the only fasteners that count [m]; without any, all do.
     """
     seen: list[tuple[Array, list[float]]] = []
     trays: list[tuple[float, Array]] = []
-    await _look(context, label, container, avoid, seen, trays)
+    await _look(context, label, container, avoid, wanted, seen, trays)
     if around and seen and not trays:
         motion, ahead = PlannedMotion(context), context.commanded_joints.copy()
         for turn in (LOOK_TURN, -LOOK_TURN):
@@ -103,7 +111,7 @@ async def see_fasteners(context: Context, label: str, container: str, avoid: Arr
             turned[TORSO] += turn
             with suppress(PlanRefused):
                 await motion.to_joints(turned, (), SPEED)
-                await _look(context, label, container, avoid, seen, trays)
+                await _look(context, label, container, avoid, wanted, seen, trays)
             if trays:
                 break
         with suppress(PlanRefused):
@@ -118,6 +126,7 @@ async def _look(
     label: str,
     container: str,
     avoid: Array,
+    wanted: Array,
     seen: list[tuple[Array, list[float]]],
     trays: list[tuple[float, Array]],
 ) -> None:
@@ -131,7 +140,9 @@ async def _look(
                 place = T[:3, :3].T @ (o.position - T[:3, 3])
                 if o.label == container:
                     trays.append((float(o.detection.score), place))
-                elif o.label == label and not stands_at(o.position, avoid, SAME):
+                elif o.label != label or stands_at(o.position, avoid, SAME):
+                    continue
+                elif not len(wanted) or stands_at(o.position, wanted, NEAR):
                     _add(seen, place, _weight(o))
 
 

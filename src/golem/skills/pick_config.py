@@ -22,17 +22,20 @@ class PickGoal:
         container: class of what it is dropped into.
         side: which hand; `either` takes the one that reaches the object and the container.
         avoid: x, y in odom of objects that are tried only where there is no other, one after the other [m].
+        wanted: x, y in odom of the only objects that are tried, likewise; none: whatever is seen.
     """
 
     label: str = "screw"
     container: str = "tray"
     side: Hand = "right"
     avoid: tuple[float, ...] = ()
+    wanted: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         if not (self.label and self.container):
             raise ConfigError("A pick names the class of the object and that of its container.")
-        floor_places("a pick", self.avoid)
+        for places in (self.avoid, self.wanted):
+            floor_places("a pick", places)
 
 
 @dataclass(frozen=True)

@@ -84,6 +84,8 @@ MOST = 0.5
 """A hand that reaches this share of the container's places surely reaches some, however much the head camera is off."""
 SAME = 0.04
 """What two looks show this near to each other is one object [m]; screws stand 9 cm apart."""
+WANTED = 0.045
+"""How far from where it is wanted the head camera may show an object [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,7 +156,7 @@ class TargetChoice:
         context.say("detect", f"Looking for a {goal.label} and a {goal.container}.")
         view = await self._see(context, goal, _View())
         blind = view.problem is not None and view.problem.outcome is PickOutcome.FAILED
-        if not blind and not self._enough(view) and self._config.turn > 0.0:
+        if not blind and not self._enough(goal, view) and self._config.turn > 0.0:
             view = await self._look_around(context, goal, view)
         if view.problem is not None:
             raise view.problem
@@ -166,8 +168,12 @@ class TargetChoice:
         places = view.container.places(self._config.drop_margin)
         share = {side: float(reach.drops(side, places, slack=False).mean()) for side in SIDES}
 
-        def order(a: Attempt) -> tuple[bool, bool, float]:
-            return (share[a.side] < MOST, self._stands_low(a.target), reach.discomfort(a.side, a.target.position))
+        wanted = floor_places("a pick", goal.wanted)
+
+        def order(a: Attempt) -> tuple[bool, float, bool, float]:
+            place = a.target.position
+            off = float(np.linalg.norm(wanted - place[:2], axis=1).min()) if len(wanted) else 0.0
+            return (share[a.side] < MOST, off, self._stands_low(a.target), reach.discomfort(a.side, place))
 
         chosen = sorted(view.attempts, key=order)[: self._config.candidates]
         text = f"{len(view.attempts)} {goal.label}s in reach."
@@ -184,15 +190,15 @@ class TargetChoice:
             with suppress(PlanRefused):
                 await motion.to_joints(turned, (), self._config.travel_speed)
                 view = await self._see(context, goal, view)
-            if self._enough(view):
+            if self._enough(goal, view):
                 break
         with suppress(PlanRefused):
             await motion.to_joints(ahead, (), self._config.travel_speed)
         return view
 
-    def _enough(self, view: _View) -> bool:
+    def _enough(self, goal: PickGoal, view: _View) -> bool:
         """Return whether nothing is missing, and not so few objects are seen that others may have been overlooked."""
-        return view.problem is None and len(view.attempts) >= self._config.few
+        return view.problem is None and (bool(goal.wanted) or len(view.attempts) >= self._config.few)
 
     async def _see(self, context: Context, goal: PickGoal, before: _View) -> _View:
         """Look until nothing is missing, adding to what is known from the view `before`."""
@@ -223,16 +229,17 @@ class TargetChoice:
         for new in (o for o in sightings.objects if o.label == goal.label):
             if all(np.linalg.norm(new.position - known.position) > SAME for known in objects):
                 objects.append(new)
-        reach = HandReach(context, self._config)
+        reach, wanted = HandReach(context, self._config), floor_places("a pick", goal.wanted)
+        mine = [o for o in objects if not len(wanted) or stands_at(o.position, wanted, WANTED)]
         attempts = [
             Attempt(goal.label, goal.container, side, o)
             for side in (SIDES if goal.side == "either" else (goal.side,))
-            for o in objects
+            for o in mine
             if reach.takes(side, o.position) and not (container and container.holds(o.position[None])[0])
         ]
         if not attempts:
-            outcome = PickOutcome.OUT_OF_REACH if objects else PickOutcome.NOTHING_THERE
-            outcome = PickOutcome.TRAY_MISSING if objects and container is None else outcome
+            outcome = PickOutcome.OUT_OF_REACH if mine else PickOutcome.NOTHING_THERE
+            outcome = PickOutcome.TRAY_MISSING if mine and container is None else outcome
             return _View(objects, container, [], _missing(outcome, f"reachable {goal.label}"))
         if container is None:
             return _View(objects, container, [], _missing(PickOutcome.TRAY_MISSING, goal.container))

@@ -109,22 +109,22 @@ def _best(
 def _judged(stances: Array, screws: Array, weights: Array, tray: Array | None) -> tuple[Array, Array]:
     """Return the (s,) quality of stances (s, 3), and how many fasteners each serves."""
     best = np.zeros((len(stances), len(screws)))
-    seen = _seen(stances, screws, 0.0)
+    seen = seen_from(stances, screws, 0.0)
     for side in SIDES:
-        room = np.minimum(_room(stances, screws, side), _room(stances, screws + (0.0, 0.0, ABOVE), side))
+        room = np.minimum(within_reach(stances, screws, side), within_reach(stances, screws + (0.0, 0.0, ABOVE), side))
         if tray is not None:
-            room = room * _room(stances, (tray + (0.0, 0.0, OVER_TRAY))[None], side)
+            room = room * within_reach(stances, (tray + (0.0, 0.0, OVER_TRAY))[None], side)
         best = np.maximum(best, room)
     best = best * seen
     quality = np.sort(best * weights, axis=1)[:, ::-1][:, :COUNT].sum(axis=1) / COUNT
     if tray is not None:
-        turned = [_seen(stances, tray[None], turn)[:, 0] for turn in (LOOK_TURN, -LOOK_TURN)]
+        turned = [seen_from(stances, tray[None], turn)[:, 0] for turn in (LOOK_TURN, -LOOK_TURN)]
         view = np.where(turned[0] | turned[1], VIEWS[1], VIEWS[2])
-        quality *= np.where(_seen(stances, tray[None], 0.0)[:, 0], VIEWS[0], view)
+        quality *= np.where(seen_from(stances, tray[None], 0.0)[:, 0], VIEWS[0], view)
     return quality, (best > 0.0).sum(axis=1)
 
 
-def _seen(stances: Array, points: Array, turn: float) -> NDArray[np.bool_]:
+def seen_from(stances: Array, points: Array, turn: float) -> NDArray[np.bool_]:
     """Return (s, n) whether the head camera sees points (n, 3) from stances (s, 3) with the torso at `turn` [rad]."""
     yaw = stances[:, 2:] + turn
     x, y = points[:, 0] - stances[:, :1], points[:, 1] - stances[:, 1:2]
@@ -138,7 +138,7 @@ def _seen(stances: Array, points: Array, turn: float) -> NDArray[np.bool_]:
     return ((pixel > low) & (pixel < high)).all(axis=-1) & (link[..., 0] > HEAD.near)
 
 
-def _room(stances: Array, points: Array, side: Side) -> Array:
+def within_reach(stances: Array, points: Array, side: Side) -> Array:
     """Return (s, n) how far within reach points (n, 3) are from stances (s, 3): 0 out of reach, 1 from `ROOM` on."""
     c, s = np.cos(stances[:, 2:]), np.sin(stances[:, 2:])
     x, y = points[:, 0] - stances[:, :1], points[:, 1] - stances[:, 1:2]

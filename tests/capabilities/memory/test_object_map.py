@@ -300,9 +300,9 @@ def test_a_disk_that_became_read_only_is_said_and_the_memory_is_as_it_was(tmp_pa
     memory.observe(look(1.0, {"mug": HERE}))
     assert memory._file is not None
     memory._file._base.execute("PRAGMA query_only=ON")  # permissions do not bind who tests as root
-    with pytest.raises(MemoryFault, match="readonly"):
+    with pytest.raises(MemoryFault, match="may not be written"):
         memory.observe(look(2.0, {"can": THERE}))
-    with pytest.raises(MemoryFault, match="readonly"):
+    with pytest.raises(MemoryFault, match="may not be written"):
         memory.forget("mug")
     assert len(memory) == 1 and memory.last == 1.0
     with pytest.raises(MemoryFault, match="cannot be used"):

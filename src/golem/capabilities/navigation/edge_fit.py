@@ -34,12 +34,14 @@ class NearEdge:
         length: between its ends [m].
         spread: RMS distance of the slices' points from the line [m].
         slices: how many there are.
+        height: of the top above the floor [m]; NaN where nobody said.
     """
 
     pose: PlanarPose
     length: float
     spread: float
     slices: int
+    height: float = math.nan
 
 
 def table_height(local: Array, heights: Array) -> float | None:

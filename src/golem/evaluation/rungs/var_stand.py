@@ -33,7 +33,7 @@ from golem.runtime.lockstep import build_robot
 from golem.skills.approach import APPROACH, approach
 from golem.skills.base import SkillResult
 from golem.skills.context import Context
-from golem.skills.disassemble import DisassembleGoal, DisassembleReport
+from golem.skills.disassemble_goal import DisassembleGoal, DisassembleReport
 from golem.skills.navigate import NavigateGoal
 from golem.skills.pick_config import PickGoal
 from golem.skills.pick_report import PickOutcome, PickReport

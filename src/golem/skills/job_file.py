@@ -1,0 +1,180 @@
+"""The file of a job: every fastener of a pack, and all that happened to it, told before and after every try."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+from pathlib import Path
+
+import numpy as np
+
+from golem.capabilities.memory.sqlite_file import SqliteFile
+from golem.errors import ConfigError
+from golem.skills.fastener_list import KINDS, Listed
+from golem.types import Array, PlanarPose, Side
+
+
+class Fate(StrEnum):
+    """What became of a fastener."""
+
+    OPEN = "open"
+    """It is to be taken, or to be tried again."""
+    TRYING = "trying"
+    """A hand is at it; where the job ended so, nobody knows."""
+    UNSETTLED = "unsettled"
+    """It was let go or lost, and was not seen in the tray: a look at its place decides."""
+    IN_TRAY = "in_tray"
+    TIGHT = "tight"
+    JAMMED = "jammed"
+    MISSING = "missing"
+    """Others are seen, and none at its place."""
+    NOT_FOUND = "not_found"
+    """A hand was there and found nothing."""
+    OUT_OF_REACH = "out_of_reach"
+    BLOCKED = "blocked"
+    LOST = "lost"
+    """Its place is empty, and it was not seen in the tray."""
+    FAILED = "failed"
+
+
+TO_DO = (Fate.OPEN, Fate.TRYING, Fate.UNSETTLED)
+"""Fates that are not the last."""
+
+
+class JobFault(ConfigError):
+    """The file of a job cannot be used."""
+
+
+@dataclass
+class Fastener:
+    """A fastener, and what was told of it last.
+
+    Attributes:
+        number: its place in the list.
+        listed: what the list says.
+        fate: what became of it.
+        reason: one sentence.
+        side: hand that tried it.
+        tray: class of the container that it is in.
+        stance: of base_link in the pack frame.
+        t, when: robot time [s], and the date, in UTC.
+        picture: path of a picture, from the folder of the job.
+        tries: how often it was tried.
+        barred: stances and hands from which it was not taken.
+    """
+
+    number: int
+    listed: Listed
+    fate: Fate = Fate.OPEN
+    reason: str = ""
+    side: str = ""
+    tray: str = ""
+    stance: PlanarPose | None = None
+    t: float = 0.0
+    when: str = ""
+    picture: str = ""
+    tries: int = 0
+    barred: list[tuple[PlanarPose, str]] = field(default_factory=list["tuple[PlanarPose, str]"])
+
+    @property
+    def place(self) -> Array:
+        """(3,) in the pack frame [m]."""
+        return np.array([self.listed.x, self.listed.y, self.listed.z])
+
+    @property
+    def label(self) -> str:
+        """What the localizer calls it."""
+        return KINDS[self.listed.kind]
+
+
+class JobFile(SqliteFile):
+    """The open file of a job; what `tell` has returned from is kept whatever happens.
+
+    Attributes:
+        fasteners: all, in the order of the list.
+        containers: what else was listed.
+    """
+
+    fault, what, version, synchronous = JobFault, "job", 1, "FULL"
+    tables = (
+        "listed (number INTEGER PRIMARY KEY, name TEXT NOT NULL, kind TEXT NOT NULL, x REAL NOT NULL, y REAL NOT NULL,"
+        " z REAL NOT NULL, loose INTEGER)",
+        "events (id INTEGER PRIMARY KEY, number INTEGER NOT NULL REFERENCES listed, fate TEXT NOT NULL,"
+        " reason TEXT NOT NULL, side TEXT NOT NULL, tray TEXT NOT NULL, x REAL, y REAL, yaw REAL, t REAL NOT NULL,"
+        " happened TEXT NOT NULL DEFAULT CURRENT_TIMESTAMP, picture TEXT NOT NULL)",
+    )
+    fasteners: list[Fastener]
+    containers: list[Listed]
+
+    def __init__(self, path: Path, listed: Sequence[Listed] = ()) -> None:
+        """Open or make the job at `path`; a new one is of what is `listed`, an old one of nothing else.
+
+        Raises:
+            JobFault: there is no such job and no list, the job is of another list, or the file cannot be used.
+        """
+        if not listed and not path.exists():
+            raise JobFault(f"There is no job {path}; name a list to begin one.")
+        super().__init__(path)
+        try:
+            with self._faults():
+                self._read(listed)
+        except BaseException:
+            self.close()
+            raise
+
+    def _read(self, listed: Sequence[Listed]) -> None:
+        rows = self._base.execute("SELECT name, kind, x, y, z, loose FROM listed ORDER BY number").fetchall()
+        if not rows:
+            with self._writing() as base:
+                values = [(k, one.name, one.kind, one.x, one.y, one.z, one.loose) for k, one in enumerate(listed)]
+                base.executemany("INSERT INTO listed VALUES (?, ?, ?, ?, ?, ?, ?)", values)
+        kept = [Listed(*row[:5], None if row[5] is None else bool(row[5])) for row in rows] or list(listed)
+        if listed and kept != list(listed):
+            raise JobFault(f"The job {self.path} is of another list; name another job, or no list to go on with it.")
+        self.fasteners = [Fastener(k, one) for k, one in enumerate(kept) if one.kind in KINDS]
+        self.containers = [one for one in kept if one.kind not in KINDS]
+        if not self.fasteners:
+            raise JobFault(f"The job {self.path} has no fasteners; name another file.")
+        by_number = {one.number: one for one in self.fasteners}
+        told = "SELECT number, fate, reason, side, tray, x, y, yaw, t, happened, picture FROM events ORDER BY id"
+        for number, *event in self._base.execute(told):
+            _take(by_number[number], *event)
+
+    def tell(
+        self,
+        one: Fastener,
+        fate: Fate,
+        t: float,
+        reason: str = "",
+        side: Side | str = "",
+        tray: str = "",
+        stance: PlanarPose | None = None,
+        picture: str = "",
+    ) -> None:
+        """Keep what happened to a fastener, for good, and then change it.
+
+        Raises:
+            JobFault: the disk is full or cannot be written.
+        """
+        pose = (None,) * 3 if stance is None else (stance.x, stance.y, stance.yaw)
+        names = "number, fate, reason, side, tray, x, y, yaw, t, picture"
+        values = (one.number, fate.value, reason, side, tray, *pose, t, picture)
+        with self._faults():
+            question = f"INSERT INTO events ({names}) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?) RETURNING happened"
+            [(happened,)] = self._base.execute(question, values).fetchall()
+        _take(one, fate, reason, side, tray, *pose, t, happened, picture)
+
+
+def _take(
+    one: Fastener, fate: str, reason: str, side: str, tray: str, x: float | None, y: float | None, yaw: float | None,
+    t: float, when: str, picture: str,
+) -> None:  # fmt: skip
+    """Put an event to the fastener that it is of."""
+    one.fate, one.reason, one.side, one.tray, one.t, one.when = Fate(fate), reason, side, tray, t, when
+    one.picture = picture or one.picture
+    one.tries += one.fate is Fate.TRYING
+    if x is not None and y is not None and yaw is not None:
+        one.stance = PlanarPose(x, y, yaw)
+        if one.fate is Fate.OPEN:
+            one.barred.append((one.stance, side))

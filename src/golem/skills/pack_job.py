@@ -1,0 +1,313 @@
+"""A whole pack, fastener by fastener: plan, go, dock, take, look, keep what happened, and plan anew."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from golem.capabilities.navigation.goto import GoTo
+from golem.interfaces import topics
+from golem.skills.approach import APPROACH, approach
+from golem.skills.base import FAULT, REFUSED, SkillResult, StageFailed
+from golem.skills.context import Context
+from golem.skills.disassemble_goal import DisassembleGoal, DisassembleReport
+from golem.skills.dock import DockGoal, DockReport
+from golem.skills.fastener_list import KINDS
+from golem.skills.frame_fit import fit_frames, matched
+from golem.skills.job_file import TO_DO, Fastener, Fate, JobFile
+from golem.skills.navigate import NavigateGoal
+from golem.skills.pack_plan import PackSides, Stop, make_plan
+from golem.skills.pack_view import NOTHING, see_edge, see_fasteners
+from golem.skills.pick_config import PickGoal
+from golem.skills.pick_report import PickOutcome, PickReport, Sight, Tried
+from golem.types import Array, PlanarPose, Side
+
+ORDER = ("near", "left", "far", "right")
+"""Sides of a pack, as in `PackSides`."""
+TRIES = 2
+"""How often a fastener is tried, from two stances or with two hands where there are such."""
+STRIKES = 3
+"""Stops in a row at which the container is not seen, or the robot does not get to, after which the job ends."""
+SAME = 0.045
+"""What is seen this near to where a fastener is listed is that one [m]: half the pitch along the long sides."""
+SHIFTED = 0.3
+"""Farthest that the container may be seen from where it is listed, for the pack to be found by it [m]."""
+LONG = 0.25
+"""Extent of the fasteners by which the turn of the pack is measured [m]."""
+BESIDE = 1.0
+"""A stance this near is gone to straight along the edge [m]."""
+BACK = 0.35
+"""How far the robot steps back before it walks elsewhere [m]."""
+STAGE = 0.75
+"""Distance before a stance up to which the navigator brings the robot [m]: nearer its arms are above the pack."""
+CONTENT = 0.1
+"""Distance from there with which it is content [m]."""
+FATES = {
+    PickOutcome.TIGHT: Fate.TIGHT,
+    PickOutcome.JAMMED: Fate.JAMMED,
+    PickOutcome.OUT_OF_REACH: Fate.OUT_OF_REACH,
+    PickOutcome.TRAY_OUT_OF_REACH: Fate.OUT_OF_REACH,
+    PickOutcome.BLOCKED: Fate.BLOCKED,
+    PickOutcome.NOTHING_THERE: Fate.NOT_FOUND,
+}
+"""What becomes of a fastener that is not tried again."""
+AT_IT = (PickOutcome.PICKED, PickOutcome.TIGHT, PickOutcome.JAMMED, PickOutcome.SLIPPED)
+"""Outcomes of a try in which the palm camera saw the fastener."""
+TRAY_TROUBLE = (PickOutcome.TRAY_MISSING, PickOutcome.TRAY_FULL)
+
+
+class PackJob:
+    """One pursuit of a job.
+
+    Attributes:
+        report: what was done.
+    """
+
+    def __init__(self, context: Context, goal: DisassembleGoal, book: JobFile) -> None:
+        """Go on with what `book` has open."""
+        self._context, self._goal, self._book = context, goal, book
+        self.report = DisassembleReport()
+        self._sides = PackSides(np.array([one.place for one in book.fasteners]))
+        self._T_odom_pack = PlanarPose(0.0, 0.0, 0.0)
+        self._rim = 0.0  # height of the pack's rim above base_link [m]
+        self._off: Array = np.zeros(2)  # where the palm cameras see fasteners, from where the head camera does [m]
+        self._full: set[str] = set()
+        self._strikes = 0
+
+    async def run(self) -> SkillResult:
+        """Take out what is open; return how it went.
+
+        Raises:
+            StageFailed: the pack is not seen, or the robot does not get on.
+        """
+        start, first = self._context.t, True
+        await self._find()
+        while True:
+            todo = [one for one in self._book.fasteners if self._wanted(one)]
+            plan = self._plan(todo)
+            if first:
+                self.report.stops, self.report.planned, first = len(plan), sum(stop.way for stop in plan), False
+            if not plan:
+                break
+            await self._work(plan[0])
+        for one in todo:
+            await self._tell(one, Fate.OUT_OF_REACH, "From no stance a hand reaches it and a container for it.")
+        return self._summary(self._context.t - start)
+
+    def _wanted(self, one: Fastener) -> bool:
+        """Return whether a fastener is to be taken now."""
+        claimed = self._goal.loosened != "list" or one.listed.loose is True
+        return one.fate in TO_DO and claimed and self._container(one.label) is not None
+
+    def _container(self, label: str) -> str | None:
+        """Return what fasteners of a label are put into; None where all are full."""
+        names = self._goal.nuts if label == "nut" else self._goal.screws
+        return next((name for name in names if name not in self._full), None)
+
+    def _plan(self, todo: list[Fastener]) -> list[Stop]:
+        """Return the stops from here, and say them."""
+        containers: dict[str, Array] = {}
+        for label in set(KINDS.values()):
+            places = [(c.x, c.y, c.z) for c in self._book.containers if c.kind == self._container(label)]
+            if places:
+                containers[label] = np.array(places)
+        plan = make_plan(self._sides, todo, containers, self._T_pack_base, self._rim)
+        served, walk = sum(len(stop.picks) for stop in plan), sum(stop.way for stop in plan)
+        text = f"{len(plan)} stops, {walk:.1f} m of way, for {served} of {len(todo)} fasteners."
+        stops = [[s.pose.x, s.pose.y, s.pose.yaw, s.height, *(number for number, _ in s.picks)] for s in plan]
+        fates = [[*one.place.tolist(), one.fate.value] for one in self._book.fasteners]
+        self._context.say("plan", text, stops=stops, fasteners=fates)
+        return plan
+
+    @property
+    def _T_pack_base(self) -> PlanarPose:
+        return self._T_odom_pack.to(PlanarPose.of(self._context.legs.pose))
+
+    def _in_odom(self, one: Fastener) -> Array:
+        """Return (2,) where a fastener is, as the head camera sees it, in odom [m]."""
+        x, y = one.place[:2].tolist()
+        there = self._T_odom_pack @ PlanarPose(x, y, 0.0)
+        return np.array([there.x, there.y])
+
+    async def _find(self) -> None:
+        """Find the pack by the edge that the robot stands before."""
+        edge = await see_edge(self._context)
+        T_pack_edge = self._sides.edges[min(ORDER.index(self._goal.side), len(self._sides.edges) - 1)]
+        T_edge_pack = T_pack_edge.to(PlanarPose(0.0, 0.0, 0.0))
+        self._T_odom_pack = PlanarPose.of(self._context.legs.pose) @ edge.pose @ T_edge_pack
+        self._rim = edge.height - float(self._context.T_odom_base[2, 3])
+
+    async def _work(self, stop: Stop) -> None:
+        """Go to a stop, and take what is planned there."""
+        ones = [(next(one for one in self._book.fasteners if one.number == k), side) for k, side in stop.picks]
+        if not await self._stand(stop, [one for one, _ in ones]):
+            for one, side in ones:
+                await self._tell(one, Fate.OPEN, one.reason, side, stance=stop.pose)
+            self._strike("The robot does not get to its stances before the pack.", "dock")
+            return
+        for one, side in ones:
+            if not self._wanted(one):
+                continue
+            if one.fate is not Fate.OPEN and not await self._still_there(one):
+                why = one.reason or "The job ended while it was being taken: it may be in the tray."
+                await self._tell(one, Fate.LOST, f"{why} Its place is empty now.")
+                continue
+            outcome = await self._take(one, side)
+            if outcome is PickOutcome.TRAY_MISSING:
+                self._strike(f"No {self._container(one.label)} is seen.", "localizer")
+            if outcome in TRAY_TROUBLE:
+                return
+        self._strikes = 0
+
+    def _strike(self, text: str, slot: str) -> None:
+        self._strikes += 1
+        if self._strikes >= STRIKES:
+            raise StageFailed("detect", slot, text)
+
+    async def _stand(self, stop: Stop, ones: list[Fastener]) -> bool:
+        """Bring the robot to a stop, and find the pack anew from there; returns whether something is within reach."""
+        context, target = self._context, self._T_odom_pack @ stop.pose
+        left = PlanarPose.of(context.legs.pose).to(target)
+        if math.hypot(left.x, left.y) < BESIDE and abs(left.yaw) < 0.5:
+            await approach(context, GoTo(APPROACH), target)
+        else:
+            here = PlanarPose.of(context.legs.pose)
+            if self._T_pack_base.x > -STAGE:
+                await approach(context, GoTo(APPROACH), here @ PlanarPose(-BACK, 0.0, 0.0))
+            stage = target @ PlanarPose(-STAGE, 0.0, 0.0)
+            walked = await context.run("navigate", NavigateGoal(stage.x, stage.y, stage.yaw, "odom", content=CONTENT))
+            if not walked.success:
+                context.say(walked.stage, walked.reason, failed=True)
+                return False
+        label = ones[0].label
+        goal = DockGoal(
+            standoff=0.42, lateral=None, label=label, container=self._container(label) or "tray",
+            wanted=tuple(v for one in ones if one.label == label for v in self._in_odom(one).tolist()),
+        )  # fmt: skip
+        docked = await context.run("dock", goal)
+        found = docked.value if isinstance(docked.value, DockReport) else DockReport()
+        self.report.docks.append(found)
+        await self._find_again({one.label for one in ones})
+        return docked.success or bool(found.served)
+
+    async def _find_again(self, labels: set[str]) -> None:
+        """Measure where the pack is by what the head camera shows of it."""
+        for label in sorted(labels):
+            container = self._container(label) or "tray"
+            seen = await see_fasteners(self._context, label, container, NOTHING, False)
+            listed = [one for one in self._book.fasteners if one.label == label and one.fate is not Fate.IN_TRAY]
+            T_pack_base, known = self._T_pack_base, np.array([one.place for one in listed]).reshape(-1, 3)
+            T = T_pack_base.matrix()
+            places = seen.places[:, :2] @ T[:2, :2].T + T[:2, 3]
+            boxes = np.array([(c.x, c.y) for c in self._book.containers if c.kind == container]).reshape(-1, 2)
+            shift = np.zeros(2)
+            if seen.tray is not None and len(boxes):
+                away = boxes - (T[:2, :2] @ seen.tray[:2] + T[:2, 3])
+                nearest = away[int(np.linalg.norm(away, axis=1).argmin())]
+                shift = nearest if np.linalg.norm(nearest) < SHIFTED else shift
+            a, b = matched(known[:, :2] - shift, places, SAME)
+            if not len(a):
+                continue
+            turned = len(a) > 3 and float(np.ptp(a, axis=0).max()) > LONG
+            moved, _ = fit_frames(a + shift, b)
+            if not turned:
+                x, y = (b - a - shift).mean(axis=0).tolist()
+                moved = PlanarPose(x, y, 0.0)
+            self._T_odom_pack = self._T_odom_pack @ moved
+            height = [float(z) for x, y, z in seen.places]
+            self._rim = float(np.median(height) - np.median(known[:, 2]))
+
+    async def _still_there(self, one: Fastener) -> bool:
+        """Look whether a fastener that may be anywhere is in its place."""
+        seen = await see_fasteners(self._context, one.label, self._container(one.label) or "tray", NOTHING, False)
+        T = self._context.T_odom_base
+        places = seen.places @ T[:3, :3].T + T[:3, 3]
+        return bool((np.linalg.norm(places[:, :2] - self._in_odom(one), axis=1) < SAME).any())
+
+    async def _take(self, one: Fastener, side: Side) -> PickOutcome:
+        """Try one fastener, and keep what came of it."""
+        stance, container = self._T_pack_base, self._container(one.label) or "tray"
+        await self._tell(one, Fate.TRYING, side=side, stance=stance)
+        x, y = self._in_odom(one).tolist()
+        result = await self._context.run("pick", PickGoal(one.label, container, side, wanted=(x, y)))
+        found = result.value if isinstance(result.value, PickReport) else PickReport()
+        self.report.picks.append(found)
+        outcome = PickOutcome(found.outcome)
+        taken = self._which(one, found.tried[-1]) if found.tried and outcome in AT_IT else one
+        if taken is not one:
+            await self._tell(one, Fate.OPEN, f"A hand came to {taken.listed.name} instead.")
+        picture = await self._picture(taken)
+        if result.success and found.in_tray != Sight.NO:
+            self.report.picked += 1
+            await self._tell(taken, Fate.IN_TRAY, result.reason, side, container, stance, picture)
+        elif outcome is PickOutcome.TRAY_FULL:
+            self._full.add(container)
+            await self._tell(one, Fate.OPEN, result.reason)
+        elif outcome is PickOutcome.TRAY_MISSING:
+            await self._tell(one, Fate.OPEN, result.reason, side, stance=stance)
+        elif outcome in (PickOutcome.PICKED, PickOutcome.SLIPPED) and found.bore_empty != Sight.NO:
+            why = result.reason if not result.success else f"It was let go and is not seen in the {container}."
+            await self._tell(taken, Fate.UNSETTLED, why, side, "", stance, picture)
+            if not await self._still_there(taken):
+                await self._tell(taken, Fate.LOST, f"{why} Its place is empty now.", side, "", stance)
+            elif taken.tries >= TRIES:
+                await self._tell(taken, Fate.FAILED, why, side, "", stance)
+            else:
+                await self._tell(taken, Fate.OPEN, why, side, "", stance)
+        else:
+            tries = 1 if outcome is PickOutcome.TIGHT and self._goal.loosened == "unknown" else TRIES
+            fate = FATES.get(outcome, Fate.FAILED) if taken.tries >= tries else Fate.OPEN
+            if fate is Fate.NOT_FOUND and not found.tried:
+                fate = Fate.MISSING
+            await self._tell(taken, fate, result.reason, side, "", stance, picture)
+        if result.stage in (FAULT, REFUSED):
+            raise StageFailed(result.stage, result.slot or "skill", result.reason)
+        return outcome
+
+    def _which(self, one: Fastener, tried: Tried) -> Fastener:
+        """Return which fastener a hand was at that was sent to `one`, and learn what the palm cameras are off by."""
+        place = np.array([tried.x, tried.y])
+        away = place - self._off - np.array([self._in_odom(each) for each in self._book.fasteners])
+        nearest = int(np.linalg.norm(away, axis=1).argmin())
+        if np.linalg.norm(place - self._in_odom(one)) < SAME:
+            self._off = 0.5 * (self._off + place - self._in_odom(one))
+        return self._book.fasteners[nearest] if np.linalg.norm(away[nearest]) < SAME / 2 else one
+
+    async def _tell(
+        self, one: Fastener, fate: Fate, reason: str = "", side: str = "", tray: str = "",
+        stance: PlanarPose | None = None, picture: str = "",
+    ) -> None:  # fmt: skip
+        """Keep what happened, on the disk, before anything else happens; live, another thread waits for the disk."""
+        t = self._context.t
+        await self._context.think(lambda: self._book.tell(one, fate, t, reason, side, tray, stance, picture), 0.0)
+        if fate is not Fate.TRYING:
+            text = f"{one.listed.name}: {fate.value.replace('_', ' ')}. {reason}"
+            self._context.say("job", text, number=one.number, fate=fate.value)
+
+    async def _picture(self, one: Fastener) -> str:
+        """Keep what the head camera shows; return the path of the picture, from the folder of the job."""
+        frame = self._context.bus.latest(topics.rgbd_images("head"))
+        if frame is None:
+            return ""
+        folder = self._book.path.with_name(f"{self._book.path.stem}_pictures")
+        path: Path = folder / f"{one.number:03d}_{one.tries}.jpg"
+
+        def write() -> bool:
+            folder.mkdir(exist_ok=True)
+            return cv2.imwrite(str(path), frame.rgb[:, :, ::-1])
+
+        return f"{folder.name}/{path.name}" if await self._context.think(write, 0.0) else ""
+
+    def _summary(self, seconds: float) -> SkillResult:
+        ones = self._book.fasteners
+        done, left = [sum(one.fate is Fate.IN_TRAY for one in ones), sum(one.fate in TO_DO for one in ones)]
+        text = f"{done} of {len(ones)} fasteners are in their trays, {len(ones) - done - left} are set aside"
+        if self._full:
+            text += f", {left} wait: full are {', '.join(sorted(self._full))}; empty them and start again."
+            return SkillResult(False, "place", "localizer", text, {"total": seconds}, self.report)
+        text += f", {left} are not said to be loose." if left else "."
+        self._context.say("done", text)
+        return SkillResult(True, "done", None, text, {"total": seconds}, self.report)
