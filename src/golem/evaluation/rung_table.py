@@ -35,6 +35,7 @@ RUNGS: dict[str, str] = {
     "navigate-line": "golem.evaluation.rungs.navigate_line:NavigateLine",
     "navigate": "golem.evaluation.rungs.navigate_hall:NavigateRung",
     "var-stand": "golem.evaluation.rungs.var_stand:VarStandRung",
+    "pack": "golem.evaluation.rungs.whole_pack:WholePackRung",
     "base-estimation": "golem.evaluation.rungs.base_estimation:BaseEstimation",
     "odometry": "golem.evaluation.rungs.odometry:OdometryRung",
     "memory": "golem.evaluation.rungs.spatial_memory:MemoryRung",
@@ -45,7 +46,7 @@ RUNGS: dict[str, str] = {
 COMPARED: dict[str, tuple[str, ...]] = {
     "grasp_method": (
         *("tether", "stand", "tether-calibrated", "fridge-tether", "fridge-stand"),
-        *("counter-tether", "counter-stand", "var-stand"),
+        *("counter-tether", "counter-stand", "var-stand", "pack"),
     ),
     "lower_body": (
         *("push", "push-ramp", "push-limit", "gate-limits", "stand-quiet", "stand-arms"),
