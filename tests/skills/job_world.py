@@ -157,6 +157,7 @@ class JobWorld:
                 steps -= 1
                 self.t += 0.01
                 self.context.refresh(self.t)
+                self.bus.deliver(self.t)
                 run.step()
         if run.error is not None:
             raise run.error

@@ -11,14 +11,23 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
+from tests.skills.conftest import modules
 from tests.skills.job_world import JobWorld, edge_places, picked, write_list
 
 from golem.errors import ConfigError
+from golem.interfaces import topics
+from golem.middleware.bus import Bus
+from golem.robots.model.kinematics import Kinematics
+from golem.skills.context import Context
 from golem.skills.disassemble_goal import DisassembleGoal
 from golem.skills.fastener_list import read_list
+from golem.skills.frame_fit import fit_frames, matched
+from golem.skills.gantry import KEEP_OFF, SILENT, Gantry
 from golem.skills.job_file import Fate, JobFault, JobFile
 from golem.skills.pick_report import PickReport
+from golem.types import PlanarPose
 
 PLACES = edge_places(30)
 GOAL = DisassembleGoal(list="list.csv", job="pack.sqlite")
@@ -134,7 +143,7 @@ def test_a_full_tray_is_changed_for_the_next_and_where_none_is_left_the_rest_wai
 def test_a_robot_that_gets_nowhere_gives_up_and_the_job_is_kept(tmp_path: Path) -> None:
     write_list(tmp_path / "list.csv", PLACES)
     result = JobWorld(PLACES, tmp_path, fails="Dock").run(GOAL)
-    assert (result.success, result.stage, result.slot) == (False, "detect", "dock")
+    assert (result.success, result.stage, result.slot) == (False, "detect", "skill")
     assert set(result.value.fates) == {"open"} and (tmp_path / "pack_inventory.html").exists()
 
 
@@ -207,3 +216,59 @@ def test_goals_without_sense_are_refused() -> None:
     for wrong in ({"list": "../pack.csv"}, {"list": "pack.txt"}, {"job": "/tmp/a.sqlite"}, {"screws": ()}):
         with pytest.raises(ConfigError):
             DisassembleGoal(**wrong)  # pyright: ignore
+
+
+def gantry(world: JobWorld, names: list[str], every: float) -> None:
+    """Let a gantry say one name after the other, which it then is at."""
+    says, n = world.context.refresh, 0
+
+    def refresh(t: float) -> None:
+        nonlocal n
+        if n < len(names) and t >= (n + 1) * every:
+            said = f"Remove: {names[n]} with confidence = 0.9"
+            world.bus.publish(topics.REMOVALS, said, t)
+            n += 1
+        says(t)
+
+    world.context.refresh = refresh  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def test_beside_a_gantry_only_what_it_is_done_with_is_taken_and_nothing_near_it(tmp_path: Path) -> None:
+    write_list(tmp_path / "list.csv", PLACES)
+    names = [f"Screw_{k}" for k in (2, 3, 31, 31, 999, 32)]  # names are those of the lines of the list
+    world = JobWorld(PLACES, tmp_path)
+    gantry(world, names, 5.0)
+    result = world.run(DisassembleGoal(list="list.csv", job="pack.sqlite", loosened="gantry"), 30_000)
+    ends = result.value.fates
+    assert result.success and ends[0] == ends[1] == "in_tray", result.reason
+    # It stays at Screw_32, the far right corner: what is near it waits.
+    at = PLACES[30]
+    assert ends[2:29] == ["open"] * 27 and ends[29:] == ["in_tray", "open", "open"]
+    assert all(np.hypot(*(PLACES[k] - at)[:2]) > KEEP_OFF for k in world.asked)
+    assert world.t > 30.0 + SILENT
+
+
+def test_words_of_a_gantry_that_say_nothing_are_left_out() -> None:
+    bus = Bus()
+    context = Context(bus, Kinematics(), 0.01, modules())
+    listens = Gantry(context, {"A"})
+    for k, text in enumerate(
+        ("", "Remove: ", "Remove: A with confidence = 0.5", "x" * 100_000, "Remove: A with confidence = nan")
+    ):
+        bus.publish(topics.REMOVALS, text, float(k))
+        context.refresh(float(k))
+        bus.deliver(float(k))
+        listens()
+    assert (listens.at, listens.loosened) == ("A", set())
+
+
+def test_frames_are_related_by_three_places_that_are_known_in_both() -> None:
+    rng, truth = np.random.default_rng(0), PlanarPose(1.0, -2.0, 2.5)
+    a = rng.uniform(-1.0, 1.0, (3, 2))
+    T = truth.matrix()
+    found, off = fit_frames(a, a @ T[:2, :2].T + T[:2, 3])
+    assert (found.x, found.y, found.yaw) == pytest.approx((1.0, -2.0, 2.5)) and off < 1e-9
+    _, off = fit_frames(a, a @ T[:2, :2].T + T[:2, 3] + rng.normal(0.0, 0.005, (3, 2)))
+    assert 0.0005 < off < 0.02
+    known, seen = matched(np.array([[0.0, 0.0], [0.1, 0.0]]), np.array([[0.11, 0.0], [0.9, 0.0]]), 0.045)
+    assert known.tolist() == [[0.1, 0.0]] and seen.tolist() == [[0.11, 0.0]]

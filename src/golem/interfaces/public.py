@@ -20,6 +20,7 @@ from golem.interfaces.rows import ActionRow, Role, ServiceRow, TopicRow
 from golem.middleware.dds.base import CALLS, DEFAULT, LATCHED, SENSOR, Payload, Qos
 from golem.middleware.ros.msgs.rosgraph_msgs import Clock
 from golem.middleware.ros.msgs.sensor_msgs import CameraInfo
+from golem.middleware.ros.msgs.std_msgs import String
 from golem.middleware.ros.msgs.tf2_msgs import TFMessage
 from golem.middleware.wire import hg
 from golem.middleware.wire.convert import decode_low_command, decode_low_state, encode_low_command, encode_low_state
@@ -235,6 +236,9 @@ TOPICS: tuple[TopicRow, ...] = (
           "Height of base_link over the ground to stand at [m]; NaN is the legs' own. It holds until the next one, a "
           "skill, or a shut gate. Legs that take none keep their own and say so in /legs/status.",
           topics.TWIST, convert.cmd_height, convert.to_cmd_height),
+    TopicRow("/triggered_behavior", "std_msgs/msg/String", "user", ("stack",), DEFAULT, None, "",
+          "What a gantry says before it loosens a fastener: `Remove: NAME with confidence = C`, as RAPID's cell does.",
+          topics.REMOVALS, String, lambda message: message.data),
     TopicRow("/legs/status", "golem_interfaces/msg/LegStatus", "stack", (), DEFAULT, 50, BASE_FRAME,
           "The twist that the lower body was commanded, what it does, and why not more.",
           topics.LEG_STATUS, convert.leg_status, on_demand=True, thinned=True),

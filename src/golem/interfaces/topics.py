@@ -104,6 +104,8 @@ NAV2_REPLY = Topic("nav2/reply", Nav2Reply)
 """From whoever speaks to Nav2, at every change."""
 NAV2_TWIST = Topic("nav2/cmd_vel", Nav2Twist)
 """From Nav2's controller."""
+REMOVALS = Topic("removals", str)
+"""From a gantry that loosens fasteners: a sentence before each."""
 FEEDBACK = Topic("skill/feedback", Feedback)
 """Of the running skill."""
 ONBOARD_LEGS = Topic("onboard/legs", LegCommand)

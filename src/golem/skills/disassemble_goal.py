@@ -12,7 +12,7 @@ from golem.skills.kept_file import check_file_name
 from golem.skills.pick_config import PickGoal
 from golem.skills.pick_report import PickReport
 
-Loosened = Literal["all", "list", "unknown"]
+Loosened = Literal["all", "list", "gantry", "unknown"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,8 +28,8 @@ class DisassembleGoal:
             none, or that of the `job`.
         job: the file that keeps what was done, `.sqlite`, in that folder; a job that is there is gone on with. Empty:
             called as the list.
-        loosened: which of the list are loose: `all`; those that the `list` says, no others being tried; or `unknown`:
-            one that is tight at the first try is not tried again.
+        loosened: which of the list are loose: `all`; those that the `list` says, no others being tried; those that a
+            `gantry` beside the robot is done with; or `unknown`: one that is tight is not tried again.
         side: of the pack at which the robot stands when it begins or goes on.
         screws, nuts: classes of what screws and nuts are put into; the next one where one is full.
     """

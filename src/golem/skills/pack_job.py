@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -17,6 +16,7 @@ from golem.skills.disassemble_goal import DisassembleGoal, DisassembleReport
 from golem.skills.dock import DockGoal, DockReport
 from golem.skills.fastener_list import KINDS
 from golem.skills.frame_fit import fit_frames, matched
+from golem.skills.gantry import KEEP_OFF, Gantry
 from golem.skills.job_file import TO_DO, Fastener, Fate, JobFile
 from golem.skills.navigate import NavigateGoal
 from golem.skills.pack_plan import PackSides, Stop, make_plan
@@ -30,7 +30,7 @@ ORDER = ("near", "left", "far", "right")
 TRIES = 2
 """How often a fastener is tried, from two stances or with two hands where there are such."""
 STRIKES = 3
-"""Stops in a row at which the container is not seen, or the robot does not get to, after which the job ends."""
+"""Stops in a row that the robot does not get to, or where no container is seen, after which the job ends."""
 SAME = 0.045
 """What is seen this near to where a fastener is listed is that one [m]: half the pitch along the long sides."""
 SHIFTED = 0.3
@@ -56,7 +56,6 @@ FATES = {
 """What becomes of a fastener that is not tried again."""
 AT_IT = (PickOutcome.PICKED, PickOutcome.TIGHT, PickOutcome.JAMMED, PickOutcome.SLIPPED)
 """Outcomes of a try in which the palm camera saw the fastener."""
-TRAY_TROUBLE = (PickOutcome.TRAY_MISSING, PickOutcome.TRAY_FULL)
 
 
 class PackJob:
@@ -69,13 +68,12 @@ class PackJob:
     def __init__(self, context: Context, goal: DisassembleGoal, book: JobFile) -> None:
         """Go on with what `book` has open."""
         self._context, self._goal, self._book = context, goal, book
-        self.report = DisassembleReport()
+        self.report, self._gantry = DisassembleReport(), Gantry(context, {one.listed.name for one in book.fasteners})
         self._sides = PackSides(np.array([one.place for one in book.fasteners]))
         self._T_odom_pack = PlanarPose(0.0, 0.0, 0.0)
         self._rim = 0.0  # height of the pack's rim above base_link [m]
         self._off: Array = np.zeros(2)  # where the palm cameras see fasteners, from where the head camera does [m]
-        self._full: set[str] = set()
-        self._strikes = 0
+        self._full, self._strikes = set[str](), 0
 
     async def run(self) -> SkillResult:
         """Take out what is open; return how it went.
@@ -84,37 +82,53 @@ class PackJob:
             StageFailed: the pack is not seen, or the robot does not get on.
         """
         start, first = self._context.t, True
-        await self._find()
-        while True:
-            todo = [one for one in self._book.fasteners if self._wanted(one)]
-            plan = self._plan(todo)
-            if first:
-                self.report.stops, self.report.planned, first = len(plan), sum(stop.way for stop in plan), False
-            if not plan:
-                break
-            await self._work(plan[0])
+        with self._context.minding(self._gantry):
+            await self._find()
+            while True:
+                todo = [one for one in self._book.fasteners if self._wanted(one)]
+                plan = self._plan(todo)
+                if first:
+                    self.report.stops, self.report.planned, first = len(plan), sum(s.way for s in plan), False
+                if plan:
+                    await self._work(plan[0])
+                elif self._goal.loosened != "gantry" or self._gantry.silent:
+                    break
+                else:
+                    heard = self._gantry.t
+                    await self._context.until(lambda: self._gantry.t != heard or self._gantry.silent, math.inf)  # noqa: B023
         for one in todo:
-            await self._tell(one, Fate.OUT_OF_REACH, "From no stance a hand reaches it and a container for it.")
+            if not self._near_gantry(one.place[:2]):
+                await self._tell(one, Fate.OUT_OF_REACH, "From no stance a hand reaches it and a container for it.")
         return self._summary(self._context.t - start)
 
     def _wanted(self, one: Fastener) -> bool:
         """Return whether a fastener is to be taken now."""
-        claimed = self._goal.loosened != "list" or one.listed.loose is True
-        return one.fate in TO_DO and claimed and self._container(one.label) is not None
+        said = {"list": one.listed.loose is True, "gantry": one.listed.name in self._gantry.loosened}
+        claimed = said.get(self._goal.loosened, True)
+        return one.fate in TO_DO and claimed and bool(self._container(one.label))
 
-    def _container(self, label: str) -> str | None:
-        """Return what fasteners of a label are put into; None where all are full."""
+    def _container(self, label: str) -> str:
+        """Return what fasteners of a label are put into; empty where all are full."""
         names = self._goal.nuts if label == "nut" else self._goal.screws
-        return next((name for name in names if name not in self._full), None)
+        return next((name for name in names if name not in self._full), "")
+
+    def _gantry_at(self) -> Array | None:
+        """Return (2,) where the gantry works, in the pack frame [m]; None where nobody said."""
+        return next((one.place[:2] for one in self._book.fasteners if one.listed.name == self._gantry.at), None)
+
+    def _near_gantry(self, place: Array) -> bool:
+        at = self._gantry_at()
+        return at is not None and float(np.linalg.norm(place - at)) < KEEP_OFF
 
     def _plan(self, todo: list[Fastener]) -> list[Stop]:
         """Return the stops from here, and say them."""
         containers: dict[str, Array] = {}
         for label in set(KINDS.values()):
             places = [(c.x, c.y, c.z) for c in self._book.containers if c.kind == self._container(label)]
-            if places:
-                containers[label] = np.array(places)
-        plan = make_plan(self._sides, todo, containers, self._T_pack_base, self._rim)
+            containers |= {label: np.array(places)} if places else {}
+        at = self._gantry_at()
+        away = None if at is None else (at, KEEP_OFF)
+        plan = make_plan(self._sides, todo, containers, self._T_pack_base, self._rim, away)
         served, walk = sum(len(stop.picks) for stop in plan), sum(stop.way for stop in plan)
         text = f"{len(plan)} stops, {walk:.1f} m of way, for {served} of {len(todo)} fasteners."
         stops = [[s.pose.x, s.pose.y, s.pose.yaw, s.height, *(number for number, _ in s.picks)] for s in plan]
@@ -128,8 +142,7 @@ class PackJob:
 
     def _in_odom(self, one: Fastener) -> Array:
         """Return (2,) where a fastener is, as the head camera sees it, in odom [m]."""
-        x, y = one.place[:2].tolist()
-        there = self._T_odom_pack @ PlanarPose(x, y, 0.0)
+        there = self._T_odom_pack @ PlanarPose(one.listed.x, one.listed.y, 0.0)
         return np.array([there.x, there.y])
 
     async def _find(self) -> None:
@@ -141,14 +154,15 @@ class PackJob:
         self._rim = edge.height - float(self._context.T_odom_base[2, 3])
 
     async def _work(self, stop: Stop) -> None:
-        """Go to a stop, and take what is planned there."""
+        """Go to a stop, and take what is planned there, until the gantry comes or there is trouble with the tray."""
         ones = [(next(one for one in self._book.fasteners if one.number == k), side) for k, side in stop.picks]
         if not await self._stand(stop, [one for one, _ in ones]):
             for one, side in ones:
                 await self._tell(one, Fate.OPEN, one.reason, side, stance=stop.pose)
-            self._strike("The robot does not get to its stances before the pack.", "dock")
-            return
+            return self._strike("The robot does not get to its stances before the pack.", "skill")
         for one, side in ones:
+            if self._near_gantry(one.place[:2]) or self._near_gantry(np.array([stop.pose.x, stop.pose.y])):
+                return None
             if not self._wanted(one):
                 continue
             if one.fate is not Fate.OPEN and not await self._still_there(one):
@@ -157,10 +171,11 @@ class PackJob:
                 continue
             outcome = await self._take(one, side)
             if outcome is PickOutcome.TRAY_MISSING:
-                self._strike(f"No {self._container(one.label)} is seen.", "localizer")
-            if outcome in TRAY_TROUBLE:
-                return
+                return self._strike(f"No {self._container(one.label)} is seen.", "localizer")
+            if outcome is PickOutcome.TRAY_FULL:
+                return None
         self._strikes = 0
+        return None
 
     def _strike(self, text: str, slot: str) -> None:
         self._strikes += 1
@@ -170,12 +185,12 @@ class PackJob:
     async def _stand(self, stop: Stop, ones: list[Fastener]) -> bool:
         """Bring the robot to a stop, and find the pack anew from there; returns whether something is within reach."""
         context, target = self._context, self._T_odom_pack @ stop.pose
-        left = PlanarPose.of(context.legs.pose).to(target)
+        here = PlanarPose.of(context.legs.pose)
+        left = here.to(target)
         if math.hypot(left.x, left.y) < BESIDE and abs(left.yaw) < 0.5:
             await approach(context, GoTo(APPROACH), target)
         else:
-            here = PlanarPose.of(context.legs.pose)
-            if self._T_pack_base.x > -STAGE:
+            if self._sides.away(self._T_pack_base) < STAGE:
                 await approach(context, GoTo(APPROACH), here @ PlanarPose(-BACK, 0.0, 0.0))
             stage = target @ PlanarPose(-STAGE, 0.0, 0.0)
             walked = await context.run("navigate", NavigateGoal(stage.x, stage.y, stage.yaw, "odom", content=CONTENT))
@@ -183,86 +198,75 @@ class PackJob:
                 context.say(walked.stage, walked.reason, failed=True)
                 return False
         label = ones[0].label
-        goal = DockGoal(
-            standoff=0.42, lateral=None, label=label, container=self._container(label) or "tray",
-            wanted=tuple(v for one in ones if one.label == label for v in self._in_odom(one).tolist()),
-        )  # fmt: skip
+        wanted = tuple(v for one in ones if one.label == label for v in self._in_odom(one).tolist())
+        goal = DockGoal(lateral=None, label=label, container=self._container(label), wanted=wanted)
         docked = await context.run("dock", goal)
         found = docked.value if isinstance(docked.value, DockReport) else DockReport()
         self.report.docks.append(found)
-        await self._find_again({one.label for one in ones})
+        for each in sorted({one.label for one in ones}):
+            await self._find_again(each, self._container(each))
         return docked.success or bool(found.served)
 
-    async def _find_again(self, labels: set[str]) -> None:
-        """Measure where the pack is by what the head camera shows of it."""
-        for label in sorted(labels):
-            container = self._container(label) or "tray"
-            seen = await see_fasteners(self._context, label, container, NOTHING, False)
-            listed = [one for one in self._book.fasteners if one.label == label and one.fate is not Fate.IN_TRAY]
-            T_pack_base, known = self._T_pack_base, np.array([one.place for one in listed]).reshape(-1, 3)
-            T = T_pack_base.matrix()
-            places = seen.places[:, :2] @ T[:2, :2].T + T[:2, 3]
-            boxes = np.array([(c.x, c.y) for c in self._book.containers if c.kind == container]).reshape(-1, 2)
-            shift = np.zeros(2)
-            if seen.tray is not None and len(boxes):
-                away = boxes - (T[:2, :2] @ seen.tray[:2] + T[:2, 3])
-                nearest = away[int(np.linalg.norm(away, axis=1).argmin())]
-                shift = nearest if np.linalg.norm(nearest) < SHIFTED else shift
-            a, b = matched(known[:, :2] - shift, places, SAME)
-            if not len(a):
-                continue
-            turned = len(a) > 3 and float(np.ptp(a, axis=0).max()) > LONG
-            moved, _ = fit_frames(a + shift, b)
-            if not turned:
-                x, y = (b - a - shift).mean(axis=0).tolist()
-                moved = PlanarPose(x, y, 0.0)
-            self._T_odom_pack = self._T_odom_pack @ moved
-            height = [float(z) for x, y, z in seen.places]
-            self._rim = float(np.median(height) - np.median(known[:, 2]))
+    async def _find_again(self, label: str, container: str) -> None:
+        """Measure where the pack is by what the head camera shows of it: first by the container, then by the rest."""
+        seen = await see_fasteners(self._context, label, container, NOTHING, False)
+        ones = [one.place for one in self._book.fasteners if one.label == label and one.fate is not Fate.IN_TRAY]
+        known, T = np.array(ones).reshape(-1, 3), self._T_pack_base.matrix()
+        places = seen.places[:, :2] @ T[:2, :2].T + T[:2, 3]
+        boxes = np.array([(c.x, c.y) for c in self._book.containers if c.kind == container]).reshape(-1, 2)
+        shift = np.zeros(2)
+        if seen.tray is not None and len(boxes):
+            away = T[:2, :2] @ seen.tray[:2] + T[:2, 3] - boxes
+            nearest = away[int(np.linalg.norm(away, axis=1).argmin())]
+            shift = nearest if np.linalg.norm(nearest) < SHIFTED else shift
+        a, b = matched(known[:, :2] + shift, places, SAME)
+        if not len(a):
+            return
+        moved, _ = fit_frames(a - shift, b)
+        if len(a) < 4 or float(np.ptp(a, axis=0).max()) < LONG:
+            x, y = (b - a + shift).mean(axis=0).tolist()
+            moved = PlanarPose(x, y, 0.0)
+        self._T_odom_pack = self._T_odom_pack @ moved
+        self._rim = float(np.median(seen.places[:, 2]) - np.median(known[:, 2]))
 
     async def _still_there(self, one: Fastener) -> bool:
         """Look whether a fastener that may be anywhere is in its place."""
-        seen = await see_fasteners(self._context, one.label, self._container(one.label) or "tray", NOTHING, False)
+        seen = await see_fasteners(self._context, one.label, self._container(one.label), NOTHING, False)
         T = self._context.T_odom_base
         places = seen.places @ T[:3, :3].T + T[:3, 3]
         return bool((np.linalg.norm(places[:, :2] - self._in_odom(one), axis=1) < SAME).any())
 
     async def _take(self, one: Fastener, side: Side) -> PickOutcome:
         """Try one fastener, and keep what came of it."""
-        stance, container = self._T_pack_base, self._container(one.label) or "tray"
+        stance, container = self._T_pack_base, self._container(one.label)
         await self._tell(one, Fate.TRYING, side=side, stance=stance)
         x, y = self._in_odom(one).tolist()
         result = await self._context.run("pick", PickGoal(one.label, container, side, wanted=(x, y)))
         found = result.value if isinstance(result.value, PickReport) else PickReport()
         self.report.picks.append(found)
-        outcome = PickOutcome(found.outcome)
+        outcome, reason, fate = PickOutcome(found.outcome), result.reason, Fate.OPEN
         taken = self._which(one, found.tried[-1]) if found.tried and outcome in AT_IT else one
         if taken is not one:
             await self._tell(one, Fate.OPEN, f"A hand came to {taken.listed.name} instead.")
-        picture = await self._picture(taken)
+        tries = 1 if outcome is PickOutcome.TIGHT and self._goal.loosened == "unknown" else TRIES
         if result.success and found.in_tray != Sight.NO:
-            self.report.picked += 1
-            await self._tell(taken, Fate.IN_TRAY, result.reason, side, container, stance, picture)
+            fate, self.report.picked = Fate.IN_TRAY, self.report.picked + 1
         elif outcome is PickOutcome.TRAY_FULL:
             self._full.add(container)
-            await self._tell(one, Fate.OPEN, result.reason)
-        elif outcome is PickOutcome.TRAY_MISSING:
-            await self._tell(one, Fate.OPEN, result.reason, side, stance=stance)
         elif outcome in (PickOutcome.PICKED, PickOutcome.SLIPPED) and found.bore_empty != Sight.NO:
-            why = result.reason if not result.success else f"It was let go and is not seen in the {container}."
-            await self._tell(taken, Fate.UNSETTLED, why, side, "", stance, picture)
+            reason = f"It was let go and is not seen in the {container}." if result.success else reason
+            await self._tell(taken, Fate.UNSETTLED, reason, side)
             if not await self._still_there(taken):
-                await self._tell(taken, Fate.LOST, f"{why} Its place is empty now.", side, "", stance)
-            elif taken.tries >= TRIES:
-                await self._tell(taken, Fate.FAILED, why, side, "", stance)
-            else:
-                await self._tell(taken, Fate.OPEN, why, side, "", stance)
-        else:
-            tries = 1 if outcome is PickOutcome.TIGHT and self._goal.loosened == "unknown" else TRIES
-            fate = FATES.get(outcome, Fate.FAILED) if taken.tries >= tries else Fate.OPEN
-            if fate is Fate.NOT_FOUND and not found.tried:
-                fate = Fate.MISSING
-            await self._tell(taken, fate, result.reason, side, "", stance, picture)
+                fate, reason = Fate.LOST, f"{reason} Its place is empty now."
+        if (
+            fate is Fate.OPEN
+            and taken.tries >= tries
+            and outcome not in (PickOutcome.TRAY_FULL, PickOutcome.TRAY_MISSING)
+        ):
+            fate = FATES.get(outcome, Fate.FAILED)
+            fate = Fate.MISSING if fate is Fate.NOT_FOUND and not found.tried else fate
+        tray = container if fate is Fate.IN_TRAY else ""
+        await self._tell(taken, fate, reason, side, tray, stance, await self._picture(taken))
         if result.stage in (FAULT, REFUSED):
             raise StageFailed(result.stage, result.slot or "skill", result.reason)
         return outcome
@@ -270,11 +274,10 @@ class PackJob:
     def _which(self, one: Fastener, tried: Tried) -> Fastener:
         """Return which fastener a hand was at that was sent to `one`, and learn what the palm cameras are off by."""
         place = np.array([tried.x, tried.y])
-        away = place - self._off - np.array([self._in_odom(each) for each in self._book.fasteners])
-        nearest = int(np.linalg.norm(away, axis=1).argmin())
+        away = np.linalg.norm([place - self._off - self._in_odom(each) for each in self._book.fasteners], axis=1)
         if np.linalg.norm(place - self._in_odom(one)) < SAME:
             self._off = 0.5 * (self._off + place - self._in_odom(one))
-        return self._book.fasteners[nearest] if np.linalg.norm(away[nearest]) < SAME / 2 else one
+        return self._book.fasteners[int(away.argmin())] if away.min() < SAME / 2 else one
 
     async def _tell(
         self, one: Fastener, fate: Fate, reason: str = "", side: str = "", tray: str = "",
@@ -290,24 +293,22 @@ class PackJob:
     async def _picture(self, one: Fastener) -> str:
         """Keep what the head camera shows; return the path of the picture, from the folder of the job."""
         frame = self._context.bus.latest(topics.rgbd_images("head"))
-        if frame is None:
-            return ""
         folder = self._book.path.with_name(f"{self._book.path.stem}_pictures")
-        path: Path = folder / f"{one.number:03d}_{one.tries}.jpg"
+        path = folder / f"{one.number:03d}_{one.tries}.jpg"
 
         def write() -> bool:
             folder.mkdir(exist_ok=True)
-            return cv2.imwrite(str(path), frame.rgb[:, :, ::-1])
+            return frame is not None and cv2.imwrite(str(path), frame.rgb[:, :, ::-1])
 
-        return f"{folder.name}/{path.name}" if await self._context.think(write, 0.0) else ""
+        return f"{folder.name}/{path.name}" if frame and await self._context.think(write, 0.0) else ""
 
     def _summary(self, seconds: float) -> SkillResult:
         ones = self._book.fasteners
-        done, left = [sum(one.fate is Fate.IN_TRAY for one in ones), sum(one.fate in TO_DO for one in ones)]
+        done, left = (sum(one.fate is Fate.IN_TRAY for one in ones), sum(one.fate in TO_DO for one in ones))
         text = f"{done} of {len(ones)} fasteners are in their trays, {len(ones) - done - left} are set aside"
         if self._full:
             text += f", {left} wait: full are {', '.join(sorted(self._full))}; empty them and start again."
             return SkillResult(False, "place", "localizer", text, {"total": seconds}, self.report)
-        text += f", {left} are not said to be loose." if left else "."
+        text += f", {left} are not said to be loose, or by the gantry." if left else "."
         self._context.say("done", text)
         return SkillResult(True, "done", None, text, {"total": seconds}, self.report)

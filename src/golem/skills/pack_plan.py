@@ -87,6 +87,10 @@ class PackSides:
         half = self.halves[k]
         return self._begins[k] + CORNER + half + min(max(local[k].y, -half), half)
 
+    def away(self, pose: PlanarPose) -> float:
+        """Return how far a pose in the pack frame is outside the pack [m]."""
+        return max(-edge.to(pose).x for edge in self.edges)
+
     def stances(self) -> list[PlanarPose]:
         """Return the stances that are tried, in the pack frame."""
         found: list[PlanarPose] = []
