@@ -50,6 +50,11 @@ def picked(number: int, tries: int) -> PickReport:
     return PickReport(PickOutcome.PICKED.value, [], "yes", "yes")
 
 
+def at(place: Any) -> PlanarPose:
+    """Return the pose of a place."""
+    return PlanarPose(float(place[0]), float(place[1]), 0.0)
+
+
 class JobWorld:
     """A robot before a pack, as far as a job knows it.
 
@@ -113,14 +118,14 @@ class JobWorld:
         return SkillResult(True, "done", None, "There.")
 
     def pick(self, goal: Any) -> SkillResult:
-        in_pack = NEAR_EDGE.to(Pose(*goal.wanted, 0.0))
+        in_pack = NEAR_EDGE.to(at(goal.wanted))
         number = int(np.hypot(self.places[:, 0] - in_pack.x, self.places[:, 1] - in_pack.y).argmin())
         self.asked.append(number)
         self.write(f"ask {number}")
         if number in self.out:
             return SkillResult(False, "detect", "localizer", "Nothing.", value=PickReport("nothing_there"))
         report = self.says(number, self.asked.count(number))
-        there = NEAR_EDGE @ Pose(*self.places[number, :2].tolist(), 0.0)
+        there = NEAR_EDGE @ at(self.places[number])
         if report.outcome != PickOutcome.NOTHING_THERE:
             report.tried = [Tried(goal.side, there.x, there.y, 0.0, report.outcome)]
         if report.outcome == PickOutcome.PICKED:
@@ -139,7 +144,7 @@ class JobWorld:
         await context.tick()
         left = [k for k in range(len(self.places)) if k not in self.out]
         T = self.pose.matrix()
-        odom = [NEAR_EDGE @ Pose(*self.places[k, :2].tolist(), 0.0) for k in left]
+        odom = [NEAR_EDGE @ at(self.places[k]) for k in left]
         base = [((p.x, p.y) - T[:2, 3]) @ T[:2, :2] for p in odom]
         seen = np.array([(*p, RIM + self.places[k, 2]) for p, k in zip(base, left, strict=True)]).reshape(-1, 3)
         return SeenFasteners(seen, np.ones(len(seen)), None)

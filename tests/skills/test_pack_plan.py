@@ -48,7 +48,7 @@ def test_a_plan_covers_what_can_be_covered_once_each_and_is_made_in_two_seconds(
     assert plan == make_plan(sides, ones, trays(4), START, RIM)
     for stop in plan:
         for number, side in stop.picks:
-            local = stop.pose.to(PlanarPose(*ones[number].place[:2].tolist(), 0.0))
+            local = stop.pose.to(PlanarPose(ones[number].listed.x, ones[number].listed.y, 0.0))
             assert 0.1 < local.x < 0.9 and (local.y if side == "left" else -local.y) > -0.2
 
 
@@ -104,7 +104,7 @@ def exact(served: NDArray[np.bool_], ring: Array, start: float, length: float) -
             cost,
             constraints=[LinearConstraint(cover, lb=1.0), LinearConstraint(np.vstack([forth, back]), lb=0.0)],
             integrality=np.concatenate([np.ones(2 * count), np.zeros(2)]),
-            bounds=Bounds(np.zeros(len(cost)), np.concatenate([np.ones(2 * count), np.full(2, length)])),
+            bounds=Bounds(0.0, np.concatenate([np.ones(2 * count), np.full(2, length)])),
             options={"mip_rel_gap": 0.02},
         )
         assert solved.success, solved.message

@@ -64,7 +64,7 @@ class DockGoal:
         require(
             "goal of docking: ",
             ("standoff", self.standoff, 0.3 <= self.standoff <= 1.5, "from 0.3 to 1.5 m"),
-            ("lateral", self.lateral, abs(self.lateral or 0.0) <= 1.0, "at most 1 m to either side"),
+            ("lateral", self.lateral or 0.0, abs(self.lateral or 0.0) <= 1.0, "at most 1 m to either side"),
             ("tolerance", self.tolerance, 0.0 < self.tolerance <= 0.2, near),
             ("turned", self.turned, 0.0 < self.turned <= 0.5, angle),
             ("approaches", self.approaches, 1 <= self.approaches <= 10, "from 1 to 10"),

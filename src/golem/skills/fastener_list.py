@@ -101,4 +101,5 @@ def _row(where: str, row: dict[str, str | None], containers: Collection[str]) ->
     if loose not in LOOSE:
         raise ConfigError(f"{where}: loose is '{shorten(loose, 40)}'; it is 1, 0 or empty.")
     name = (row.get("name") or "").strip() or f"{kind.capitalize()}_{where.rpartition(' ')[2]}"
-    return None if kind == HOLE else Listed(shorten(name, 60), kind, *place, LOOSE[loose])
+    x, y, z = place
+    return None if kind == HOLE else Listed(shorten(name, 60), kind, x, y, z, LOOSE[loose])

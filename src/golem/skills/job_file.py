@@ -129,7 +129,7 @@ class JobFile(SqliteFile):
             with self._writing() as base:
                 values = [(k, one.name, one.kind, one.x, one.y, one.z, one.loose) for k, one in enumerate(listed)]
                 base.executemany("INSERT INTO listed VALUES (?, ?, ?, ?, ?, ?, ?)", values)
-        kept = [Listed(*row[:5], None if row[5] is None else bool(row[5])) for row in rows] or list(listed)
+        kept = [Listed(a, b, x, y, z, None if s is None else bool(s)) for a, b, x, y, z, s in rows] or list(listed)
         if listed and kept != list(listed):
             raise JobFault(f"The job {self.path} is of another list; name another job, or no list to go on with it.")
         self.fasteners = [Fastener(k, one) for k, one in enumerate(kept) if one.kind in KINDS]
@@ -138,8 +138,9 @@ class JobFile(SqliteFile):
             raise JobFault(f"The job {self.path} has no fasteners; name another file.")
         by_number = {one.number: one for one in self.fasteners}
         told = "SELECT number, fate, reason, side, tray, x, y, yaw, t, happened, picture FROM events ORDER BY id"
-        for number, *event in self._base.execute(told):
-            _take(by_number[number], *event)
+        for number, fate, reason, side, tray, x, y, yaw, t, when, picture in self._base.execute(told):
+            stance = None if x is None else PlanarPose(x, y, yaw)
+            _take(by_number[number], Fate(fate), reason, side, tray, stance, t, when, picture)
 
     def tell(
         self,
@@ -163,18 +164,16 @@ class JobFile(SqliteFile):
         with self._faults():
             question = f"INSERT INTO events ({names}) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?) RETURNING happened"
             [(happened,)] = self._base.execute(question, values).fetchall()
-        _take(one, fate, reason, side, tray, *pose, t, happened, picture)
+        _take(one, fate, reason, side, tray, stance, t, happened, picture)
 
 
 def _take(
-    one: Fastener, fate: str, reason: str, side: str, tray: str, x: float | None, y: float | None, yaw: float | None,
-    t: float, when: str, picture: str,
+    one: Fastener, fate: Fate, reason: str, side: str, tray: str, stance: PlanarPose | None, t: float, when: str,
+    picture: str,
 ) -> None:  # fmt: skip
     """Put an event to the fastener that it is of."""
-    one.fate, one.reason, one.side, one.tray, one.t, one.when = Fate(fate), reason, side, tray, t, when
-    one.picture = picture or one.picture
-    one.tries += one.fate is Fate.TRYING
-    if x is not None and y is not None and yaw is not None:
-        one.stance = PlanarPose(x, y, yaw)
-        if one.fate is Fate.OPEN:
-            one.barred.append((one.stance, side))
+    one.fate, one.reason, one.side, one.tray, one.t, one.when = fate, reason, side, tray, t, when
+    one.picture, one.stance = picture or one.picture, stance or one.stance
+    one.tries += fate is Fate.TRYING
+    if fate is Fate.OPEN and stance is not None:
+        one.barred.append((stance, side))

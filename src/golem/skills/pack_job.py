@@ -155,7 +155,8 @@ class PackJob:
 
     async def _work(self, stop: Stop) -> None:
         """Go to a stop, and take what is planned there, until the gantry comes or there is trouble with the tray."""
-        ones = [(next(one for one in self._book.fasteners if one.number == k), side) for k, side in stop.picks]
+        by_number = {one.number: one for one in self._book.fasteners}
+        ones: list[tuple[Fastener, Side]] = [(by_number[k], side) for k, side in stop.picks]
         if not await self._stand(stop, [one for one, _ in ones]):
             for one, side in ones:
                 await self._tell(one, Fate.OPEN, one.reason, side, stance=stop.pose)

@@ -9,7 +9,7 @@ stops are on one ring around the pack, so the shortest way through them leaves o
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -38,8 +38,10 @@ NEED = 0.25
 """How far within reach a fastener has to be, of `stance_choice.ROOM`, where some stance has it so."""
 BARRED = (0.12, 0.3)
 """A stance this near to one from which a fastener was not taken is the same [m, rad]."""
-EAGER = (0.0, 0.5, 1.0, 2.0)
-"""How much the way counts in the greedy beginnings."""
+BEGINNINGS = 24
+"""Greedy beginnings, of which one in four goes by the gain alone, and the others the more by the way."""
+SPREAD = 0.3
+"""How much what a stance gains is varied between them, as a share."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,11 +144,11 @@ def make_plan(
     at = start
     for k, s in enumerate(chosen):
         mine = [f for f in range(len(wanted)) if owner[:, f].max() > 0.0 and int(owner[:, f].argmax()) == k]
-        hand: dict[int, Side] = {f: SIDES[int(quality[:, s, f].argmax())] for f in mine}
-        mine.sort(key=lambda f: (hand[f], poses[s].to(PlanarPose(*wanted[f].place[:2].tolist(), 0.0)).y))
+        hands: dict[int, Side] = {f: SIDES[int(quality[:, s, f].argmax())] for f in mine}
+        mine.sort(key=lambda f: (hands[f], poses[s].to(PlanarPose(wanted[f].listed.x, wanted[f].listed.y, 0.0)).y))
         way = abs(math.remainder(ring[s] - at, sides.length))
         if mine:
-            stops.append(Stop(poses[s], -rim, tuple((wanted[f].number, hand[f]) for f in mine), way))
+            stops.append(Stop(poses[s], -rim, tuple((wanted[f].number, hands[f]) for f in mine), way))
             at = ring[s]
     return stops
 
@@ -181,54 +183,49 @@ def choose(served: NDArray[np.bool_], best: Array, ring: Array, start: float, le
         length: of the ring [m].
     """
     todo = served.any(axis=0)
-    found: list[list[int]] = []
-    for eager in EAGER if todo.any() else ():
-        stops, left = list[int](), todo.copy()
+    if not todo.any():
+        return []
+
+    def costs(stops: NDArray[np.intp]) -> Array:
+        """Return (m,) what each row of `stops` (m, k) costs, as a way [m]."""
+        well = np.where(served[stops], best[stops], 0.0).max(axis=1).mean(axis=1)
+        return DOCKING * stops.shape[1] + way(ring[stops], start, length)[0] - WORTH * well
+
+    found, rng = list[tuple[float, list[int]]](), np.random.default_rng(0)
+    for begin in range(BEGINNINGS):
+        stops, left, eager = list[int](), todo.copy(), 0.5 * (begin % 4)
+        luck = rng.uniform(1.0 - SPREAD, 1.0 + SPREAD, len(served)) if begin > 3 else np.ones(len(served))
         while left.any():
-            gain = (served[:, left] * (1.0 + 0.1 * best[:, left])).sum(axis=1)
+            gain = luck * (served[:, left] * (1.0 + 0.1 * best[:, left])).sum(axis=1)
             from_here = np.abs((ring[:, None] - [start, *ring[stops]] + length / 2) % length - length / 2).min(axis=1)
             stops.append(int(np.argmax(gain / (DOCKING + eager * from_here))))
             left &= ~served[stops[-1]]
-        found.append(_improved(stops, served, best, ring, start, length))
-    if not found:
-        return []
-    stops = np.array(min(found, key=lambda one: _costs(np.array([one]), served, best, ring, start, length)[0]))
-    _, order = way(ring[stops], start, length)
-    return stops[order].tolist()
+        found.append(_improved(stops, served & todo, costs))
+    stops = min(found)[1]
+    return [stops[k] for k in way(ring[stops], start, length)[1]]
 
 
 def _improved(
-    stops: list[int], served: NDArray[np.bool_], best: Array, ring: Array, start: float, length: float
-) -> list[int]:
-    """Return stops that cover the same, after every exchange of one for one, or of two or one for none or one."""
-    todo = served[stops].any(axis=0)
-    cost = _costs(np.array([stops]), served, best, ring, start, length)[0]
-    again = True
+    stops: list[int], served: NDArray[np.bool_], costs: Callable[[NDArray[np.intp]], Array]
+) -> tuple[float, list[int]]:
+    """Return stops that cover the same, after every exchange of two or one for none or one that costs less."""
+    todo = served.any(axis=0)
+    cost, again = float(costs(np.array([stops], np.intp))[0]), True
     while again:
         again = False
-        for count in (1, 2):
-            for out in combinations(range(len(stops)), count):
-                kept = [s for k, s in enumerate(stops) if k not in out]
-                need = todo & ~served[kept].any(axis=0) if kept else todo
-                fits = np.flatnonzero(served[:, need].all(axis=1))
-                tried = np.column_stack([np.tile(np.array(kept, int), (len(fits), 1)), fits])
-                options = [np.array([kept], int)] if kept and not need.any() else []
-                for group in (*options, *([tried] if len(fits) else [])):
-                    costs = _costs(group, served, best, ring, start, length)
-                    k = int(costs.argmin())
-                    if costs[k] < cost - 1e-9:
-                        stops, cost, again = group[k].tolist(), float(costs[k]), True
-                if again:
-                    break
+        for out in [out for count in (1, 2) for out in combinations(range(len(stops)), count)]:
+            kept = np.array([s for k, s in enumerate(stops) if k not in out], np.intp)
+            need = todo & ~served[kept].any(axis=0)
+            fits = np.flatnonzero(served[:, need].all(axis=1))
+            groups = [np.column_stack([np.tile(kept, (len(fits), 1)), fits])] if len(fits) else []
+            for group in [*groups, *([kept[None]] if len(kept) and not need.any() else [])]:
+                tried = costs(group)
+                k = int(tried.argmin())
+                if tried[k] < cost - 1e-9:
+                    stops, cost, again = group[k].tolist(), float(tried[k]), True
             if again:
                 break
-    return stops
-
-
-def _costs(stops: Array, served: NDArray[np.bool_], best: Array, ring: Array, start: float, length: float) -> Array:
-    """Return (m,) what each row of `stops` (m, k) costs, as a way [m]."""
-    well = np.where(served[stops], best[stops], 0.0).max(axis=1).mean(axis=1)
-    return DOCKING * stops.shape[1] + way(ring[stops], start, length)[0] - WORTH * well
+    return cost, stops
 
 
 def way(places: Array, start: float, length: float) -> tuple[Array, NDArray[np.intp]]:
