@@ -104,7 +104,7 @@ def exact(served: NDArray[np.bool_], ring: Array, start: float, length: float) -
             cost,
             constraints=[LinearConstraint(cover, lb=1.0), LinearConstraint(np.vstack([forth, back]), lb=0.0)],
             integrality=np.concatenate([np.ones(2 * count), np.zeros(2)]),
-            bounds=Bounds(0.0, np.concatenate([np.ones(2 * count), np.full(2, length)])),
+            bounds=Bounds(0.0, np.append(np.ones(2 * count), (length, length))),  # pyright: ignore[reportArgumentType]
             options={"mip_rel_gap": 0.02},
         )
         assert solved.success, solved.message

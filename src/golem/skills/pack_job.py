@@ -27,6 +27,8 @@ from golem.types import Array, PlanarPose, Side
 
 ORDER = ("near", "left", "far", "right")
 """Sides of a pack, as in `PackSides`."""
+PLANNING = 1.0
+"""Time that a plan takes [s]."""
 TRIES = 2
 """How often a fastener is tried, from two stances or with two hands where there are such."""
 STRIKES = 3
@@ -86,7 +88,7 @@ class PackJob:
             await self._find()
             while True:
                 todo = [one for one in self._book.fasteners if self._wanted(one)]
-                plan = self._plan(todo)
+                plan = await self._plan(todo)
                 if first:
                     self.report.stops, self.report.planned, first = len(plan), sum(s.way for s in plan), False
                 if plan:
@@ -120,7 +122,7 @@ class PackJob:
         at = self._gantry_at()
         return at is not None and float(np.linalg.norm(place - at)) < KEEP_OFF
 
-    def _plan(self, todo: list[Fastener]) -> list[Stop]:
+    async def _plan(self, todo: list[Fastener]) -> list[Stop]:
         """Return the stops from here, and say them."""
         containers: dict[str, Array] = {}
         for label in set(KINDS.values()):
@@ -128,7 +130,8 @@ class PackJob:
             containers |= {label: np.array(places)} if places else {}
         at = self._gantry_at()
         away = None if at is None else (at, KEEP_OFF)
-        plan = make_plan(self._sides, todo, containers, self._T_pack_base, self._rim, away)
+        args = self._sides, todo, containers, self._T_pack_base, self._rim, away
+        plan = await self._context.think(lambda: make_plan(*args), PLANNING)
         served, walk = sum(len(stop.picks) for stop in plan), sum(stop.way for stop in plan)
         text = f"{len(plan)} stops, {walk:.1f} m of way, for {served} of {len(todo)} fasteners."
         stops = [[s.pose.x, s.pose.y, s.pose.yaw, s.height, *(number for number, _ in s.picks)] for s in plan]

@@ -38,9 +38,9 @@ NEED = 0.25
 """How far within reach a fastener has to be, of `stance_choice.ROOM`, where some stance has it so."""
 BARRED = (0.12, 0.3)
 """A stance this near to one from which a fastener was not taken is the same [m, rad]."""
-BEGINNINGS = 24
+BEGINNINGS = 64
 """Greedy beginnings, of which one in four goes by the gain alone, and the others the more by the way."""
-SPREAD = 0.3
+SPREAD = 0.5
 """How much what a stance gains is varied between them, as a share."""
 
 
