@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.optimize import Bounds, LinearConstraint, milp
 
 from golem.skills.fastener_list import Listed
-from golem.skills.job_file import Fastener
+from golem.skills.job_file import PackFastener
 from golem.skills.pack_plan import DOCKING, PackSides, choose, make_plan, way
 from golem.types import Array, PlanarPose
 
@@ -18,7 +18,7 @@ START = PlanarPose(-1.2, 0.0, 0.0)
 RIM = 0.0
 
 
-def pack(seed: int) -> list[Fastener]:
+def pack(seed: int) -> list[PackFastener]:
     """Return 84 fasteners like those of a real pack: pitches from 25 to 115 mm, screws and nuts, two levels."""
     rng = np.random.default_rng(seed)
     along, x = np.sort(rng.uniform(-1.04, 1.04, 50)), np.sort(rng.uniform(0.05, 1.2, 34))
@@ -26,7 +26,9 @@ def pack(seed: int) -> list[Fastener]:
     spots = near + [(u, 1.06 if k % 2 else -1.06) for k, u in enumerate(x)]
     kinds = rng.choice(["screw", "nut"], len(spots), p=[0.65, 0.35])
     rows = zip(spots, kinds, rng.random(len(spots)) < 0.14, strict=True)
-    return [Fastener(k, Listed(f"{k}", str(kind), x, y, -0.065 * low)) for k, ((x, y), kind, low) in enumerate(rows)]
+    return [
+        PackFastener(k, Listed(f"{k}", str(kind), x, y, -0.065 * low)) for k, ((x, y), kind, low) in enumerate(rows)
+    ]
 
 
 def trays(n: int) -> dict[str, Array]:
@@ -69,7 +71,8 @@ def test_a_stance_that_failed_and_what_is_near_the_gantry_are_left_out() -> None
 
 def test_a_list_of_one_edge_is_worked_on_from_that_edge() -> None:
     ones = [
-        Fastener(k, Listed(f"{k}", "screw", 0.022, y, 0.0)) for k, y in enumerate(np.linspace(-0.5, 0.5, 9).tolist())
+        PackFastener(k, Listed(f"{k}", "screw", 0.022, y, 0.0))
+        for k, y in enumerate(np.linspace(-0.5, 0.5, 9).tolist())
     ]
     plan = make_plan(PackSides(np.array([one.place for one in ones])), ones, {}, START, RIM)
     assert sum(len(stop.picks) for stop in plan) == 9 and all(stop.pose.x < -0.3 for stop in plan)

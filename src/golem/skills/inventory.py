@@ -9,7 +9,7 @@ from io import StringIO
 from pathlib import Path
 
 from golem.errors import OutputError
-from golem.skills.job_file import Fastener, Fate, JobFile
+from golem.skills.job_file import Fate, JobFile, PackFastener
 
 COLUMNS = (
     *("name", "class", "x", "y", "z", "said_loose", "fate", "reason", "tries", "hand", "tray", "stance", "robot_s"),
@@ -47,7 +47,7 @@ def write_inventory(book: JobFile) -> Path:
     return page
 
 
-def _row(one: Fastener) -> tuple[str, ...]:
+def _row(one: PackFastener) -> tuple[str, ...]:
     said = {None: "", True: "yes", False: "no"}[one.listed.loose]
     stance = "" if one.stance is None else f"{one.stance.x:.2f} {one.stance.y:.2f} {one.stance.yaw:.2f}"
     place = tuple(f"{v:.3f}" for v in one.place.tolist())

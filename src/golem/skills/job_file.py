@@ -47,7 +47,7 @@ class JobFault(ConfigError):
 
 
 @dataclass
-class Fastener:
+class PackFastener:
     """A fastener, and what was told of it last.
 
     Attributes:
@@ -104,7 +104,7 @@ class JobFile(SqliteFile):
         " reason TEXT NOT NULL, side TEXT NOT NULL, tray TEXT NOT NULL, x REAL, y REAL, yaw REAL, t REAL NOT NULL,"
         " happened TEXT NOT NULL DEFAULT CURRENT_TIMESTAMP, picture TEXT NOT NULL)",
     )
-    fasteners: list[Fastener]
+    fasteners: list[PackFastener]
     containers: list[Listed]
 
     def __init__(self, path: Path, listed: Sequence[Listed] = ()) -> None:
@@ -132,7 +132,7 @@ class JobFile(SqliteFile):
         kept = [Listed(a, b, x, y, z, None if s is None else bool(s)) for a, b, x, y, z, s in rows] or list(listed)
         if listed and kept != list(listed):
             raise JobFault(f"The job {self.path} is of another list; name another job, or no list to go on with it.")
-        self.fasteners = [Fastener(k, one) for k, one in enumerate(kept) if one.kind in KINDS]
+        self.fasteners = [PackFastener(k, one) for k, one in enumerate(kept) if one.kind in KINDS]
         self.containers = [one for one in kept if one.kind not in KINDS]
         if not self.fasteners:
             raise JobFault(f"The job {self.path} has no fasteners; name another file.")
@@ -144,7 +144,7 @@ class JobFile(SqliteFile):
 
     def tell(
         self,
-        one: Fastener,
+        one: PackFastener,
         fate: Fate,
         t: float,
         reason: str = "",
@@ -168,7 +168,7 @@ class JobFile(SqliteFile):
 
 
 def _take(
-    one: Fastener, fate: Fate, reason: str, side: str, tray: str, stance: PlanarPose | None, t: float, when: str,
+    one: PackFastener, fate: Fate, reason: str, side: str, tray: str, stance: PlanarPose | None, t: float, when: str,
     picture: str,
 ) -> None:  # fmt: skip
     """Put an event to the fastener that it is of."""

@@ -17,9 +17,9 @@ from golem.skills.dock import DockGoal, DockReport
 from golem.skills.fastener_list import KINDS
 from golem.skills.frame_fit import fit_frames, matched
 from golem.skills.gantry import KEEP_OFF, Gantry
-from golem.skills.job_file import TO_DO, Fastener, Fate, JobFile
+from golem.skills.job_file import TO_DO, Fate, JobFile, PackFastener
 from golem.skills.navigate import NavigateGoal
-from golem.skills.pack_plan import PackSides, Stop, make_plan
+from golem.skills.pack_plan import PackSides, PackStop, make_plan
 from golem.skills.pack_view import NOTHING, see_edge, see_fasteners
 from golem.skills.pick_config import PickGoal
 from golem.skills.pick_report import PickOutcome, PickReport, Sight, Tried
@@ -103,7 +103,7 @@ class PackJob:
                 await self._tell(one, Fate.OUT_OF_REACH, "From no stance a hand reaches it and a container for it.")
         return self._summary(self._context.t - start)
 
-    def _wanted(self, one: Fastener) -> bool:
+    def _wanted(self, one: PackFastener) -> bool:
         """Return whether a fastener is to be taken now."""
         said = {"list": one.listed.loose is True, "gantry": one.listed.name in self._gantry.loosened}
         claimed = said.get(self._goal.loosened, True)
@@ -122,7 +122,7 @@ class PackJob:
         at = self._gantry_at()
         return at is not None and float(np.linalg.norm(place - at)) < KEEP_OFF
 
-    async def _plan(self, todo: list[Fastener]) -> list[Stop]:
+    async def _plan(self, todo: list[PackFastener]) -> list[PackStop]:
         """Return the stops from here, and say them."""
         containers: dict[str, Array] = {}
         for label in set(KINDS.values()):
@@ -143,7 +143,7 @@ class PackJob:
     def _T_pack_base(self) -> PlanarPose:
         return self._T_odom_pack.to(PlanarPose.of(self._context.legs.pose))
 
-    def _in_odom(self, one: Fastener) -> Array:
+    def _in_odom(self, one: PackFastener) -> Array:
         """Return (2,) where a fastener is, as the head camera sees it, in odom [m]."""
         there = self._T_odom_pack @ PlanarPose(one.listed.x, one.listed.y, 0.0)
         return np.array([there.x, there.y])
@@ -154,12 +154,13 @@ class PackJob:
         T_pack_edge = self._sides.edges[min(ORDER.index(self._goal.side), len(self._sides.edges) - 1)]
         T_edge_pack = T_pack_edge.to(PlanarPose(0.0, 0.0, 0.0))
         self._T_odom_pack = PlanarPose.of(self._context.legs.pose) @ edge.pose @ T_edge_pack
-        self._rim = edge.height - float(self._context.T_odom_base[2, 3])
+        base = self._context.bus.latest(topics.BASE)
+        self._rim = edge.height - (0.0 if base is None else base.height)
 
-    async def _work(self, stop: Stop) -> None:
+    async def _work(self, stop: PackStop) -> None:
         """Go to a stop, and take what is planned there, until the gantry comes or there is trouble with the tray."""
         by_number = {one.number: one for one in self._book.fasteners}
-        ones: list[tuple[Fastener, Side]] = [(by_number[k], side) for k, side in stop.picks]
+        ones: list[tuple[PackFastener, Side]] = [(by_number[k], side) for k, side in stop.picks]
         if not await self._stand(stop, [one for one, _ in ones]):
             for one, side in ones:
                 await self._tell(one, Fate.OPEN, one.reason, side, stance=stop.pose)
@@ -186,7 +187,7 @@ class PackJob:
         if self._strikes >= STRIKES:
             raise StageFailed("detect", slot, text)
 
-    async def _stand(self, stop: Stop, ones: list[Fastener]) -> bool:
+    async def _stand(self, stop: PackStop, ones: list[PackFastener]) -> bool:
         """Bring the robot to a stop, and find the pack anew from there; returns whether something is within reach."""
         context, target = self._context, self._T_odom_pack @ stop.pose
         here = PlanarPose.of(context.legs.pose)
@@ -233,14 +234,14 @@ class PackJob:
         self._T_odom_pack = self._T_odom_pack @ moved
         self._rim = float(np.median(seen.places[:, 2]) - np.median(known[:, 2]))
 
-    async def _still_there(self, one: Fastener) -> bool:
+    async def _still_there(self, one: PackFastener) -> bool:
         """Look whether a fastener that may be anywhere is in its place."""
         seen = await see_fasteners(self._context, one.label, self._container(one.label), NOTHING, False)
         T = self._context.T_odom_base
         places = seen.places @ T[:3, :3].T + T[:3, 3]
         return bool((np.linalg.norm(places[:, :2] - self._in_odom(one), axis=1) < SAME).any())
 
-    async def _take(self, one: Fastener, side: Side) -> PickOutcome:
+    async def _take(self, one: PackFastener, side: Side) -> PickOutcome:
         """Try one fastener, and keep what came of it."""
         stance, container = self._T_pack_base, self._container(one.label)
         await self._tell(one, Fate.TRYING, side=side, stance=stance)
@@ -275,7 +276,7 @@ class PackJob:
             raise StageFailed(result.stage, result.slot or "skill", result.reason)
         return outcome
 
-    def _which(self, one: Fastener, tried: Tried) -> Fastener:
+    def _which(self, one: PackFastener, tried: Tried) -> PackFastener:
         """Return which fastener a hand was at that was sent to `one`, and learn what the palm cameras are off by."""
         place = np.array([tried.x, tried.y])
         away = np.linalg.norm([place - self._off - self._in_odom(each) for each in self._book.fasteners], axis=1)
@@ -284,7 +285,7 @@ class PackJob:
         return self._book.fasteners[int(away.argmin())] if away.min() < SAME / 2 else one
 
     async def _tell(
-        self, one: Fastener, fate: Fate, reason: str = "", side: str = "", tray: str = "",
+        self, one: PackFastener, fate: Fate, reason: str = "", side: str = "", tray: str = "",
         stance: PlanarPose | None = None, picture: str = "",
     ) -> None:  # fmt: skip
         """Keep what happened, on the disk, before anything else happens; live, another thread waits for the disk."""
@@ -294,7 +295,7 @@ class PackJob:
             text = f"{one.listed.name}: {fate.value.replace('_', ' ')}. {reason}"
             self._context.say("job", text, number=one.number, fate=fate.value)
 
-    async def _picture(self, one: Fastener) -> str:
+    async def _picture(self, one: PackFastener) -> str:
         """Keep what the head camera shows; return the path of the picture, from the folder of the job."""
         frame = self._context.bus.latest(topics.rgbd_images("head"))
         folder = self._book.path.with_name(f"{self._book.path.stem}_pictures")

@@ -16,7 +16,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from golem.skills.job_file import Fastener
+from golem.skills.job_file import PackFastener
 from golem.skills.stance_choice import ABOVE, LOOK_TURN, OVER_TRAY, seen_from, within_reach
 from golem.types import SIDES, Array, PlanarPose, Side
 
@@ -45,7 +45,7 @@ SPREAD = 0.5
 
 
 @dataclass(frozen=True, slots=True)
-class Stop:
+class PackStop:
     """A place to work from.
 
     Attributes:
@@ -104,12 +104,12 @@ class PackSides:
 
 def make_plan(
     sides: PackSides,
-    wanted: Sequence[Fastener],
+    wanted: Sequence[PackFastener],
     containers: Mapping[str, Array],
     here: PlanarPose,
     rim: float,
     keep_off: tuple[Array, float] | None = None,
-) -> list[Stop]:
+) -> list[PackStop]:
     """Return the stops, in order, from which everything of `wanted` is served that can be.
 
     Args:
@@ -139,7 +139,7 @@ def make_plan(
     ring = np.array([sides.ring(p) for p in poses])
     start = sides.ring(here)
     chosen = choose(served, best, ring, start, sides.length)
-    stops: list[Stop] = []
+    stops: list[PackStop] = []
     owner = np.where(served[chosen], best[chosen], 0.0) if chosen else np.zeros((0, len(wanted)))
     at = start
     for k, s in enumerate(chosen):
@@ -148,12 +148,12 @@ def make_plan(
         mine.sort(key=lambda f: (hands[f], poses[s].to(PlanarPose(wanted[f].listed.x, wanted[f].listed.y, 0.0)).y))
         way = abs(math.remainder(ring[s] - at, sides.length))
         if mine:
-            stops.append(Stop(poses[s], -rim, tuple((wanted[f].number, hands[f]) for f in mine), way))
+            stops.append(PackStop(poses[s], -rim, tuple((wanted[f].number, hands[f]) for f in mine), way))
             at = ring[s]
     return stops
 
 
-def _quality(stances: Array, wanted: Sequence[Fastener], containers: Mapping[str, Array], rim: float) -> Array:
+def _quality(stances: Array, wanted: Sequence[PackFastener], containers: Mapping[str, Array], rim: float) -> Array:
     """Return (2, s, n) how far within reach of the hands the fasteners are from stances (s, 3), 0 to 1."""
     lift = np.array([0.0, 0.0, rim])
     quality = np.zeros((len(SIDES), len(stances), len(wanted)))
