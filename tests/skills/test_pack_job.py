@@ -212,6 +212,13 @@ def test_a_file_that_may_not_be_written_is_said(tmp_path: Path, monkeypatch: pyt
         JobFile(path)
 
 
+def test_an_inventory_that_is_a_link_is_not_written_to_and_the_job_ends_all_the_same(tmp_path: Path) -> None:
+    (tmp_path / "mine").write_text("mine")
+    (tmp_path / "pack_inventory.html").symlink_to(tmp_path / "mine")
+    _, ends = job(tmp_path)
+    assert ends == [Fate.IN_TRAY] * 32 and (tmp_path / "mine").read_text() == "mine"
+
+
 def test_goals_without_sense_are_refused() -> None:
     for wrong in ({"list": "../pack.csv"}, {"list": "pack.txt"}, {"job": "/tmp/a.sqlite"}, {"screws": ()}):
         with pytest.raises(ConfigError):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from golem.errors import ConfigError
+from golem.errors import ConfigError, OutputError
 from golem.skills.base import SkillResult, StageFailed
 from golem.skills.context import Context
 from golem.skills.disassemble_goal import DisassembleGoal, DisassembleReport
@@ -67,7 +67,10 @@ class Disassemble:
             result = SkillResult(False, failure.stage, failure.slot, str(failure), value=job.report)
         finally:
             job.report.fates = [one.fate.value for one in book.fasteners]
-            job.report.inventory = str(write_inventory(book))
+            try:
+                job.report.inventory = str(write_inventory(book))
+            except OutputError as problem:
+                context.say("done", str(problem), failed=True)
             book.close()
         return result
 

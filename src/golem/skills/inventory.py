@@ -39,6 +39,8 @@ def write_inventory(book: JobFile) -> Path:
         f"<h1>Inventory of {escape(book.path.stem)}</h1><p>{len(rows)} fasteners: {counts}.</p>\n{_plan(book)}\n"
         f"<table><tr>{head}</tr>\n{lines}</table>\n"
     )
+    if page.is_symlink() or page.with_suffix(".csv").is_symlink():
+        raise OutputError(f"The inventory '{page}' is a link, which is not written to; take it away.")
     try:
         page.with_suffix(".csv").write_text(table.getvalue(), encoding="utf-8")
         page.write_text(text, encoding="utf-8")
