@@ -16,7 +16,8 @@ class MemoryFile(SqliteFile):
 
     fault, what, version = MemoryFault, "memory", 1
     tables = (
-        f"objects (number INTEGER PRIMARY KEY, label TEXT NOT NULL, {', '.join(f'{c} REAL NOT NULL' for c in COLUMNS)})",
+        "objects (number INTEGER PRIMARY KEY, label TEXT NOT NULL, "
+        f"{', '.join(f'{name} REAL NOT NULL' for name in COLUMNS)})",
         "clock (one INTEGER PRIMARY KEY, last REAL NOT NULL)",
     )
 
