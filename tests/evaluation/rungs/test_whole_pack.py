@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -10,7 +11,9 @@ import numpy as np
 import pytest
 
 from golem.evaluation.base import TrialOutcome, TrialSpec, make_rung, rung_class
+from golem.evaluation.episodes.oracle import Whereabouts
 from golem.evaluation.rungs.whole_pack import WholePackOptions, WholePackRung, judged, lost_by, write_claims
+from golem.robots.worlds.ioniq5 import Ioniq5Layout
 from golem.robots.worlds.layout import PackLayout
 from golem.skills.fastener_list import read_list
 from golem.skills.job_file import Fate
@@ -20,6 +23,10 @@ SCENE: Any = SimpleNamespace(
     draws=tuple(SimpleNamespace(slot=slot) for slot in (8, 9, 30)),
     names=SimpleNamespace(screws=("screw_08", "screw_09", "screw_30")),
 )
+
+
+def tray(slot: int, inside: bool, right: bool = True) -> Whereabouts:
+    return Whereabouts(slot, "screw", True, "tray" if inside else "floor", "tray", inside and right)
 
 
 def test_it_is_a_rung_of_grasp_methods() -> None:
@@ -41,25 +48,33 @@ def test_the_list_has_every_fastener_and_claims_that_are_wrong_as_often_as_asked
     assert 0.04 < off < 0.06
 
 
+def test_the_list_of_the_real_pack_has_its_kinds_and_trays(tmp_path: Path) -> None:
+    scene: Any = SimpleNamespace(layout=Ioniq5Layout(), draws=())
+    write_claims(tmp_path / "a.csv", scene, WholePackOptions(world="ioniq5"), np.random.default_rng(0))
+    kinds = Counter(one.kind for one in read_list(tmp_path / "a.csv", {"tray"}))
+    assert kinds == {"screw": 53, "nut": 30, "bolt": 1, "tray": 8}
+
+
 def test_the_share_in_the_tray_wrong_words_and_false_claims_are_counted() -> None:
     claims = [(7, True), (8, True), (9, True), (10, True), (30, False)]
     fates = [Fate.TIGHT, Fate.IN_TRAY, Fate.IN_TRAY, Fate.JAMMED, Fate.OPEN]
-    series = judged(SCENE, claims, fates, ["screw_08"])
+    found = [Whereabouts(7, "screw", False), *(tray(slot, slot == 8) for slot in (8, 9, 30))]
+    series = judged(claims, fates, found)
     assert series == pytest.approx(
         {
             "lost_in_tray": 1.0,
-            "lost_open": 1.0,
+            "lost_unclaimed": 1.0,
             "loosened_in_tray": 1 / 3,
+            "right_tray": 1 / 3,
             "wrong_in_tray": 1.0,
             "loosened": 3.0,
             "wrong_refusals": 1.0,
             "false_claims_found": 0.5,
         }
     )
-    assert sorted(lost_by(series)) == ["grasp_method", "skill"]
-    assert judged(SCENE, [(8, True), (9, True), (30, True)], [Fate.IN_TRAY] * 3, SCENE.names.screws)[
-        "loosened_in_tray"
-    ] == pytest.approx(1.0)
+    assert sorted(lost_by(series)) == ["grasp_method", "list"]
+    whole = judged([(8, True), (9, True)], [Fate.IN_TRAY] * 2, [tray(8, True), tray(9, True, right=False)])
+    assert (whole["loosened_in_tray"], whole["right_tray"]) == (1.0, 0.5)
 
 
 def test_its_table_blames_by_fastener() -> None:

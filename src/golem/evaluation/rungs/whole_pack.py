@@ -16,13 +16,14 @@ import numpy as np
 from golem.evaluation.base import DONE, Case, Outcomes, Results, TrialOutcome, TrialSpec
 from golem.evaluation.episodes.contacts import ContactWatch
 from golem.evaluation.episodes.episode import Episode, episode_seed
-from golem.evaluation.episodes.oracle import Oracle
+from golem.evaluation.episodes.oracle import Oracle, Whereabouts, whereabouts
 from golem.evaluation.episodes.pick_touches import PickTouches
 from golem.evaluation.metrics.text_table import TextTable
 from golem.evaluation.rungs.pick_screw import SETTLE
 from golem.evaluation.rungs.var_stand import STILL, VarStandRung
 from golem.robots.mujoco.scene import Scene
 from golem.robots.worlds.conditions import REACH_Y, LayoutKind
+from golem.robots.worlds.layout import PackLayout
 from golem.skills.disassemble import JOB, Disassemble
 from golem.skills.disassemble_goal import DisassembleGoal, DisassembleReport
 from golem.skills.job_file import Fate
@@ -33,9 +34,19 @@ AWAY = 0.5
 """Distance behind the nominal stance at which the robot begins [m]."""
 EDGE = 0.05
 """Fasteners this near to the near edge belong to it [m]."""
+HEAD = 0.006
+"""Height of a head above its place [m]."""
 LOOK = 0.2
 """Time between two looks at where the robot is [s]."""
-BLAME = {Fate.MISSING: "localizer", Fate.NOT_FOUND: "localizer", Fate.OUT_OF_REACH: "skill", Fate.OPEN: "skill"}
+UNCLAIMED = "unclaimed"
+"""What became of a loosened fastener that the gantry calls tight: nobody asks for it."""
+BLAME = {
+    Fate.MISSING.value: "localizer",
+    Fate.NOT_FOUND.value: "localizer",
+    Fate.OUT_OF_REACH.value: "skill",
+    Fate.OPEN.value: "skill",
+    UNCLAIMED: "list",
+}
 """Slot that loses a fastener of a fate; the others are lost by the grasp method."""
 
 
@@ -47,6 +58,8 @@ class WholePackOptions:
     """nominal or varied; see the rung `stand`."""
     sweep: str = ""
     """As on the rung `stand`."""
+    world: Literal["pack", "ioniq5"] = "pack"
+    """The pack; see the rung `stand`."""
     part: Literal["whole", "edge"] = "whole"
     """whole: the gantry has been all round. edge: along the near edge only."""
     wrong: float = 0.05
@@ -72,12 +85,13 @@ class WholePackRung(VarStandRung):
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
         """Run one trial; see `Rung`."""
         stack = self._stack(spec.method, spec.profile, spec.overrides).with_options(
-            "robot", layout=self.options.layout, conditions=dict(spec.case), stance=[AWAY, 0.0, 0.0], world="pack",
-            obstacles=0, reach_y=REACH_Y,
+            "robot", layout=self.options.layout, conditions=dict(spec.case), stance=[AWAY, 0.0, 0.0],
+            world=self.options.world, obstacles=0, reach_y=REACH_Y,
         )  # fmt: skip
         folder = TemporaryDirectory()
         with folder, closing(Episode(stack, episode_seed(spec.seed, spec.index), self.onlooker)) as episode:
             scene, robot = episode.robot.scene, episode.robot
+            part = asked_for(scene.layout, self.options)
             claims = write_claims(Path(folder.name) / "pack.csv", scene, self.options, spec.rng("claims"))
             with closing(Oracle(robot)) as oracle:
                 episode.stand(STILL)
@@ -102,14 +116,17 @@ class WholePackRung(VarStandRung):
                 episode.run(SETTLE)
                 found = result.value if result is not None and isinstance(result.value, DisassembleReport) else None
                 fates = found.fates if found is not None else [Fate.OPEN] * len(claims)
-                series = judged(scene, claims, [Fate(fate) for fate in fates], oracle.screws_in_tray())
+                series = judged(
+                    claims, [Fate(fate) for fate in fates], [w for w in whereabouts(robot) if w.slot in part]
+                )
                 series |= {**touches.series(), "contacts": float(len(contacts.touched)), "distance": walked}
                 series |= {"dockings": float(len(found.docks)), "planned": found.planned} if found is not None else {}
                 success = loss is None and series["loosened_in_tray"] == 1.0
                 stage = DONE if success else loss.stage if loss is not None else "pack"
                 worst = max(BLAME.values() if loss else lost_by(series), key=lost_by(series).count, default=None)
                 slot = None if success else "lower_body" if loss is not None else worst
-                module = f"{slot}: {stack.choice(slot).use}" if slot in KEYS else slot and f"{slot}: disassemble"
+                named = {"skill": "disassemble", "list": "gantry"}
+                module = f"{slot}: {stack.choice(slot).use}" if slot in KEYS else slot and f"{slot}: {named[slot]}"
                 said = loss.detail if loss is not None else "" if result is None else result.reason
                 return TrialOutcome(success, stage, module, said, {"total": took}, series, oracle.picture())
 
@@ -120,11 +137,16 @@ class WholePackRung(VarStandRung):
             count = Counter[str]()
             for _, outcome in trials:
                 count.update({k[5:]: round(v) for k, v in outcome.series.items() if k.startswith("lost_")})
-            rows += [(method, fate, str(n), BLAME.get(Fate(fate), "grasp_method")) for fate, n in count.most_common()]
+            rows += [(method, fate, str(n), BLAME.get(fate, "grasp_method")) for fate, n in count.most_common()]
         note = "By what the robot says of them; `in_tray` are those of which it wrongly says that they are there."
         return [
             TextTable("Loosened fasteners in no tray", ("method", "said", "fasteners", "blamed"), tuple(rows), note)
         ]
+
+
+def asked_for(layout: PackLayout, options: WholePackOptions) -> set[int]:
+    """Return the places at which the gantry has been."""
+    return {slot for slot, at in enumerate(layout.fasteners()) if options.part == "whole" or at[0] < EDGE}
 
 
 def write_claims(
@@ -132,35 +154,37 @@ def write_claims(
 ) -> list[tuple[int, bool]]:
     """Write the list of a pack as a gantry would; return the place and the claim of each of its fasteners."""
     layout, loose = scene.layout, {draw.slot for draw in scene.draws}
-    x, y, z, _ = np.linalg.inv(layout.pose()) @ (*layout.tray_xy, layout.tray_z, 1.0)
-    rows, claims = [f"tray,{x:.4f},{y:.4f},{z:.4f},"], list[tuple[int, bool]]()
+    rows, claims, asked = list[str](), list[tuple[int, bool]](), asked_for(layout, options)
+    for tray in layout.trays():
+        x, y, z, _ = np.linalg.inv(layout.pose()) @ (tray.x, tray.y, tray.z, 1.0)
+        rows.append(f"tray,{x:.4f},{y:.4f},{z:.4f},")
     wrong = rng.random(len(layout.fasteners())) < options.wrong
-    for slot, (x, y) in enumerate(layout.fasteners().tolist()):
+    for slot, (x, y, z) in enumerate(layout.fasteners().tolist()):
         if slot not in layout.empty_holes or slot in loose:
-            claimed = (slot in loose) != bool(wrong[slot]) and (options.part == "whole" or x < EDGE)
+            claimed = (slot in loose) != bool(wrong[slot]) and slot in asked
             claims.append((slot, claimed))
-            rows.append(f"screw,{x:.4f},{y:.4f},0.006,{int(claimed)}")
+            rows.append(f"{layout.kind(slot)},{x:.4f},{y:.4f},{z + HEAD:.4f},{int(claimed)}")
     file.write_text("\n".join(["class,x,y,z,loose", *rows]), encoding="utf-8")
     return claims
 
 
-def judged(
-    scene: Scene, claims: Sequence[tuple[int, bool]], fates: Sequence[Fate], in_tray: Sequence[str]
-) -> dict[str, float]:
+def judged(claims: Sequence[tuple[int, bool]], fates: Sequence[Fate], found: Sequence[Whereabouts]) -> dict[str, float]:
     """Return what became of the loosened fasteners, and which of the robot's words are wrong, as figures."""
-    there = {d.slot: n in in_tray for d, n in zip(scene.draws, scene.names.screws, strict=True)}
+    there = {one.slot: one.where == "tray" for one in found if one.loose}
     said = {slot: (claimed, fate) for (slot, claimed), fate in zip(claims, fates, strict=True)}
-    lost = Counter(said[slot][1].value for slot, inside in there.items() if not inside)
+    lost = Counter(said[s][1].value if said[s][0] else UNCLAIMED for s, inside in there.items() if not inside)
     wrong = [fate for slot, (claimed, fate) in said.items() if claimed and slot not in there]
     missed = [slot for slot, inside in there.items() if not inside and said[slot][0]]
     boasts = [slot for slot, (_, fate) in said.items() if fate is Fate.IN_TRAY and not there.get(slot, False)]
     series = {f"lost_{fate}": float(n) for fate, n in lost.items()}
+    right = sum(one.right for one in found if one.loose)
     series |= {"loosened_in_tray": sum(there.values()) / max(len(there), 1), "wrong_in_tray": float(len(boasts))}
+    series |= {"right_tray": right / max(len(there), 1)}
     series |= {"loosened": float(len(there)), "wrong_refusals": float(len(missed))}
     return series | ({"false_claims_found": sum(f is Fate.TIGHT for f in wrong) / len(wrong)} if wrong else {})
 
 
 def lost_by(series: dict[str, float]) -> list[str]:
     """Return the slot that lost each fastener that is in no tray."""
-    lost = [(Fate(k[5:]), round(n)) for k, n in series.items() if k.startswith("lost_")]
+    lost = [(k[5:], round(n)) for k, n in series.items() if k.startswith("lost_")]
     return [BLAME.get(fate, "grasp_method") for fate, n in lost for _ in range(n)]
