@@ -74,6 +74,7 @@ def read(path: Path, data: Mapping[str, Any], network: Path | None) -> Passport:
     order: HistoryOrder = "frame" if by_frame else "term"
     ranges = at(data, "commands", "base_velocity", "ranges")
     axes = [numbers(k, at(ranges, k), 2) for k in ("lin_vel_x", "lin_vel_y", "ang_vel_z")]
+    vx, vy, wz = cast("list[tuple[float, float]]", axes)
     description = Description(
         network="policy.onnx",
         observation=terms,
@@ -85,7 +86,7 @@ def read(path: Path, data: Mapping[str, Any], network: Path | None) -> Passport:
             targets=target_limits(moved, action.get("clip")),
         ),
         gait=GaitConfig(PERIOD if period is None else float(period), start="never" if period is None else "always"),
-        envelope=Envelope(*cast("list[tuple[float, float]]", axes)),
+        envelope=Envelope(vx, vy, wz),
         rate=1.0 / numbers("step_dt", at(data, "step_dt"), 1)[0],
         joints=moved,
         history=order,

@@ -62,7 +62,8 @@ def read(path: Path, data: Mapping[str, Any], network: Path | None) -> Passport:
     assumed = [f"The gait clock of its deployment: {PERIOD:g} s, sine, then cosine; it never rests."]
     envelope = ASSUMED_TWISTS
     if "max_cmd" in data:
-        envelope = Envelope(*((-x, x) for x in numbers("max_cmd", data["max_cmd"], 3)))
+        vx, vy, wz = ((-x, x) for x in numbers("max_cmd", data["max_cmd"], 3))
+        envelope = Envelope(vx, vy, wz)
     else:
         assumed.append(f"It can follow vx {envelope.vx}, vy {envelope.vy} m/s, wz {envelope.wz} rad/s.")
     description = Description(
