@@ -33,6 +33,7 @@ def test_it_is_a_rung_of_grasp_methods() -> None:
     assert rung_class("pack") is WholePackRung
     rung = make_rung("golem.evaluation.rungs.whole_pack:WholePackRung", {"part": "edge"})
     assert "visual_servo" in rung.methods() and list(rung.cases(lambda case: None)) == [{}]
+    assert "goal" in rung.config("visual_servo", "bench", {})
 
 
 def test_the_list_has_every_fastener_and_claims_that_are_wrong_as_often_as_asked(tmp_path: Path) -> None:

@@ -28,6 +28,7 @@ from golem.skills.disassemble import JOB, Disassemble
 from golem.skills.disassemble_goal import DisassembleGoal, DisassembleReport
 from golem.skills.job_file import Fate
 from golem.skills.kept_file import KeptFileConfig
+from golem.skills.pick_config import PickGoal
 from golem.slots import KEYS
 
 AWAY = 0.5
@@ -77,6 +78,11 @@ class WholePackRung(VarStandRung):
     Options = WholePackOptions
     options: Any
     default_n = 10
+
+    @property
+    def _goal(self) -> PickGoal:
+        """Of each pick: either hand."""
+        return PickGoal(side="either")
 
     def cases(self, results: Results) -> Sequence[Case]:
         """Return the values of the sweep; see `Rung`."""
