@@ -20,7 +20,7 @@ from golem.capabilities.arms.base import UpperBody
 from golem.capabilities.arms.diff_ik import DiffIK
 from golem.capabilities.arms.postures import posture
 from golem.errors import ConfigError, MissingExtra
-from golem.evaluation.speed.gate_bench import check_ticks
+from golem.evaluation.speed.gate_bench import check_ticks, gate_ticks
 from golem.evaluation.speed.navigation_bench import navigation_times
 from golem.hardware.safety.base import GateInputs, OperatorRequest, SafetyLimits
 from golem.hardware.safety.gate import check
@@ -130,6 +130,7 @@ def _control(config: BenchConfig) -> list[Figure]:
         memory = check(GateInputs(t, state, command, EstopMessage(t, i % 256, False), request), limits, memory).memory
 
     figures.append(figure("safety gate tick", check_ticks(n), 1e6, "us", "25 us wanted"))
+    figures.append(figure("safety process tick", gate_ticks(n), 1e6, "us", ""))
     figures.append(figure("servo + safety tick", timed(tick, n), 1e6, "us", "2000 us available at 500 Hz"))
     return figures
 

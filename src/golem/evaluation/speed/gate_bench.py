@@ -1,16 +1,11 @@
-"""CPU time of a tick of the gate, and of the safety process around it: `python -m golem.evaluation.speed.gate_bench`.
-
-There is no network.
-"""
+"""CPU time of a tick of the gate, and of the safety process around it, without a network."""
 
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
 from itertools import count
 
 import numpy as np
-import tyro
 
 from golem.errors import GolemError
 from golem.hardware.estop.virtual import VirtualEstop
@@ -31,14 +26,6 @@ from golem.types import NUM_JOINTS, TICK, Array, BaseEstimate, Imu, LowCommand, 
 
 WARM_UP = 500
 """Ticks of the gate alone that are not timed; it is activated half-way."""
-
-
-@dataclass(frozen=True)
-class GateBenchConfig:
-    """Time the gate and the safety process while they let commands through."""
-
-    ticks: int = 5000
-    """Ticks to time."""
 
 
 def gate_ticks(n: int) -> Array:
@@ -107,15 +94,3 @@ def check_ticks(n: int) -> Array:
     if result.state is not GateState.ACTIVE:
         raise GolemError(f"The gate is {result.state} ({result.reason}: {result.detail}), not active.")
     return np.array(times)
-
-
-def main() -> None:
-    """Print medians and 99th percentiles."""
-    n = tyro.cli(GateBenchConfig).ticks
-    for name, times in (("gate alone", check_ticks(n)), ("safety process", gate_ticks(n))):
-        median, high = 1e6 * np.quantile(times, (0.5, 0.99))
-        print(f"{name}, CPU time per tick: median {median:.0f} us, p99 {high:.0f} us")
-
-
-if __name__ == "__main__":
-    main()

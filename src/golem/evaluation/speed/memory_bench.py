@@ -1,12 +1,9 @@
-"""`golem bench memory`: a memory of objects with a file, at scale, and killed in the middle of writing."""
+"""`golem bench memory`: a memory of objects with a file, at scale."""
 
 from __future__ import annotations
 
 import json
 import os
-import signal
-import subprocess
-import sys
 import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -26,21 +23,18 @@ LABELS = tuple(SYNONYMS)
 NEAR, VIEW = 6, 0.4
 """Objects in a look, and height of the camera above their middle [m]."""
 QUESTIONS = 2000
-COUNT = "seen %d"
 
 
 @dataclass(frozen=True)
 class MemoryBenchConfig:
-    """Print figures of a memory of objects at scale, and how often a killed process lost what it had kept."""
+    """Print figures of a memory of objects at scale."""
 
     observations: int = 100_000
     """Looks that are taken in, each written to the file."""
     objects: int = 10_000
     """Objects in the room."""
-    kills: int = 100
-    """How often a process that writes is killed."""
     seed: int = 0
-    """Seed of the room and of the moments."""
+    """Seed of the room."""
     json: bool = False
     """Print the figures as a last line of JSON."""
 
@@ -80,12 +74,10 @@ def run_memory_bench(config: MemoryBenchConfig) -> list[Figure]:
     Raises:
         ConfigError: a number is negative, or there is nothing to see.
     """
-    if min(config.observations, config.kills, config.seed) < 0 or config.objects < NEAR:
-        raise ConfigError(f"--observations, --kills and --seed are at least 0, --objects at least {NEAR}.")
+    if min(config.observations, config.seed) < 0 or config.objects < NEAR:
+        raise ConfigError(f"--observations and --seed are at least 0, --objects at least {NEAR}.")
     with TemporaryDirectory() as folder:
         figures = _scale(config, Path(folder) / "memory.sqlite")
-        lost = sum(_killed(Path(folder) / f"{k}.sqlite", config.seed + k) for k in range(config.kills))
-    figures.append(Figure(f"kill -9 while writing, {config.kills} times: lost looks", lost, lost, "", "0"))
     print_figures(figures, "object_map with a file", "wanted")
     if config.json:
         print(json.dumps([asdict(f) for f in figures]))
@@ -127,34 +119,3 @@ def _resident() -> float:
     except OSError:
         return 0.0
     return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
-
-
-def _killed(path: Path, seed: int) -> int:
-    """Return how many looks are lost that a process had acknowledged before it was killed."""
-    words = [sys.executable, "-m", "golem.evaluation.speed.memory_bench", str(path), str(seed)]
-    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as writer:
-        assert writer.stdout is not None
-        first = writer.stdout.readline()
-        time.sleep(np.random.default_rng(seed).uniform(0.0, 0.05))
-        writer.send_signal(signal.SIGKILL)
-        lines = [first, *writer.stdout]
-    told = [int(line.split()[1]) for line in lines if line.endswith("\n")]
-    if not told:
-        raise RuntimeError(f"A process that was to write {path} ended before its first look.")
-    memory = ObjectMap(ObjectMapConfig(file=str(path)))
-    kept = 0 if np.isinf(memory.last) else round(memory.last)
-    memory.close()
-    return max(0, max(told) - kept)
-
-
-def _write(path: str, seed: int) -> None:
-    """Take looks in for ever, and say after each which it was."""
-    room, memory, i = Room(100, seed), ObjectMap(ObjectMapConfig(file=path)), 0
-    while True:
-        i += 1
-        memory.observe(room.look(float(i), i * NEAR))
-        print(COUNT % i, flush=True)
-
-
-if __name__ == "__main__":
-    _write(sys.argv[1], int(sys.argv[2]))

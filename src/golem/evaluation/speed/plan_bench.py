@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
@@ -15,6 +14,7 @@ from golem.capabilities.arms.goal_postures import GoalPostures
 from golem.capabilities.arms.postures import posture
 from golem.capabilities.arms.solve import downward
 from golem.capabilities.arms.trajectory import gate_limits
+from golem.capabilities.collision.link_poses import joint_names
 from golem.capabilities.collision.mesh_oracle import MeshOracle
 from golem.capabilities.collision.obstacles import Obstacle, World
 from golem.capabilities.collision.pack_robot import our_robot
@@ -196,7 +196,6 @@ def measure(planner: ArmPlanner, robot: PlanningRobot, asked: list[Query]) -> Pl
     planner.plan(replace(asked[0].request))  # compiles, where nothing is cached
     times, durations = np.empty(len(asked)), list[float]()
     solved = hits = mesh_hits = beyond = 0
-    columns = _columns(mesh)
     for i, query in enumerate(asked):
         start = time.thread_time()
         try:
@@ -213,9 +212,7 @@ def measure(planner: ArmPlanner, robot: PlanningRobot, asked: list[Query]) -> Pl
         hits += bool(model.collides_each(Q, 0.0, query.request.world).any())
         beyond += not within_limits(plan, query.request)
         sparse = Q[_every(Q, MESH_STEP)]
-        full = np.zeros((len(sparse), len(columns)))
-        full[:, columns >= 0] = sparse[:, columns[columns >= 0]]
-        mesh_hits += any(mesh.collides(q) for q in full)
+        mesh_hits += any(mesh.collides(whole_posture(mesh, q)) for q in sparse)
     return PlanScore(solved, times, np.array(durations), hits, mesh_hits, beyond)
 
 
@@ -242,8 +239,7 @@ def _every(Q: Array, step: float) -> list[int]:
     return [*rows, len(Q) - 1]
 
 
-def _columns(mesh: MeshOracle) -> NDArray[np.int64]:
-    """Return for each joint of the meshes' tree its column among torso and arms, or -1."""
-    names = list(JOINT_NAMES[UPPER])
-    joints = [link.joint for link in mesh.links if link.kind != "fixed"]
-    return np.array([names.index(j) if j in names else -1 for j in joints])
+def whole_posture(mesh: MeshOracle, q: Array) -> Array:
+    """Return the position of each joint of the meshes' tree: torso and arms at `q` (15,), the others at 0 [rad]."""
+    known = dict(zip(JOINT_NAMES[UPPER], q, strict=True))
+    return np.array([known.get(joint, 0.0) for joint in joint_names(mesh.links)])
