@@ -200,16 +200,12 @@ def _skill(words: list[str]) -> int:
 def _check(words: list[str]) -> int:
     """Check modules against their contracts: `check`, `check SLOT [USE]`.
 
-    `check robot --domain N`: the robot there; `check policy FILE`: a trainer's leg policy.
+    `check policy FILE`: a trainer's leg policy.
     """
     if words[:1] == ["policy"]:
         from golem.evaluation.passport.policy_command import PolicyCheckConfig, run_policy_check
 
         return 0 if run_policy_check(_parse(PolicyCheckConfig, "check policy", words[1:])) else FAILED
-    if any(word.partition("=")[0] == "--domain" for word in words):
-        from golem.evaluation.conformance.domain_command import DomainCheckConfig, run_domain_check
-
-        return 0 if run_domain_check(_parse(DomainCheckConfig, "check", words)) else FAILED
     _prepare_graphics()
     from golem.evaluation.conformance.check_command import CheckConfig, run_check
 

@@ -263,8 +263,6 @@ SERVICES: tuple[ServiceRow, ...] = (
     ServiceRow("/estop/press", "std_srvs/srv/SetBool", "safety",
             "Press or release the virtual emergency stop; simulation only."),
     ServiceRow("/elastic_band/release", TRIGGER, "robot", "Let the band of a standing robot go; simulation only."),
-    ServiceRow("/lowstate/jump", TRIGGER, "robot",
-            "Stamp one state a second too early, as a clock that jumps does; simulation only."),
     ServiceRow("/skill/take_over", TRIGGER, "stack",
             "Take the lease for skills from who has it: whoever asks for one next gets it."),
     *(service for side in SIDES for service in (

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from golem.evaluation.conformance.base import FAILED, SKIPPED, Candidate, Report
 from golem.evaluation.conformance.examine import run_suite
 from golem.evaluation.conformance.robot_measures import RobotMeasures, floor_normal, rotated, up_in_base
-from golem.evaluation.conformance.robot_rig import LockstepRig, Path, RobotRig
+from golem.evaluation.conformance.robot_rig import Path, RobotRig
 from golem.evaluation.conformance.still_robot import StillRobot
 from golem.hardware.servo.gravity import Gravity
 from golem.robots.model.imu_mount import TORSO
@@ -169,7 +169,7 @@ def test_a_wrong_device_is_named(spoil: dict[str, float], check: str) -> None:
 
 
 def test_a_robot_that_no_command_moves_is_not_asked_to_move() -> None:
-    report = measured(LockstepRig(StillRobot(), start_posture()))
+    report = measured(RobotRig(StillRobot(), start_posture()))
     skipped = {f.check: f.reason for f in report.findings if f.status == SKIPPED}
     assert "no physics" in skipped["answers_a_step"] and "LiDAR" in skipped["lidar_sees_the_floor_level"]
     assert not report.failed

@@ -191,16 +191,6 @@ def test_a_reset_of_legs_that_stand_by_the_gate_succeeds_once_its_reason_is_gone
     assert live.ask("reset") == (True, "stop2")
 
 
-def test_a_clock_that_jumps_stops_the_robot_and_it_can_go_on(live: Live) -> None:
-    live.activate()
-    assert live.ask("/lowstate/jump") == (False, "The robot's time has just begun.")
-    live.run(1.0)
-    assert live.ask("/lowstate/jump")[0]
-    live.run(0.01)
-    assert (live.state, live.reason) == (GateState.STOP1, "state_clock_jumped")
-    live.reset()
-
-
 def test_a_command_is_as_old_as_the_state_it_answers(live: Live) -> None:
     live.activate()
     assert live.twin is not None

@@ -17,30 +17,15 @@ from rich.table import Table
 from rich.text import Text
 
 from golem import registry
-from golem.errors import ConfigError, GolemError, OutputError
+from golem.errors import GolemError, OutputError
 from golem.evaluation.conformance.base import FAILED, PASSED, Check, Finding, Report
-from golem.evaluation.conformance.engine_table import BEGIN as ENGINES_BEGIN
-from golem.evaluation.conformance.engine_table import END as ENGINES_END
-from golem.evaluation.conformance.engine_table import engine_table, read_reports
 from golem.evaluation.conformance.examine import SUITES, UNCHECKED, candidate, examine, suite_of
 
-BEGIN, END = "<!-- golem check: begin -->", "<!-- golem check: end -->"
-"""Between these lines of a page stands the table."""
 _MARKS = {PASSED: ("✓", "green"), FAILED: ("✗", "red")}
 
 
-@dataclass(frozen=True, kw_only=True)
-class Output:
-    """Where the findings go."""
-
-    json: bool = False
-    """Print JSON instead of the report."""
-    save: Path | None = None
-    """Keep the JSON in this file, too."""
-
-
 @dataclass(frozen=True)
-class CheckConfig(Output):
+class CheckConfig:
     """Check modules against the contracts of their slots.
 
     Exit code 0: all promises are kept. 1: one is broken. 2: the module cannot be found, or this machine lacks what it
@@ -51,27 +36,20 @@ class CheckConfig(Output):
     """Which slot; default: all."""
     use: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="[USE]", help_behavior_hint="")] = ""
     """Module: a name, file.py:Class, package.module:Class or "{use: NAME, option: value}"; default: all shipped."""
-    page: Path | None = None
-    """Write the table of all modules, or with --compare of those reports, into this page, between its two marks."""
-    compare: tuple[Path, ...] = ()
-    """Check nothing: put reports of --save side by side, for robots in several engines."""
+    json: bool = False
+    """Print JSON instead of the report."""
+    save: Path | None = None
+    """Keep the JSON in this file, too."""
 
 
 def run_check(config: CheckConfig) -> bool:
     """Check what `config` names and print the report; return whether all promises are kept.
 
     Raises:
-        ConfigError: there is no such slot or module, or the page has no marks.
+        ConfigError: there is no such slot or module.
         GolemError: this machine lacks what the module needs.
-        OutputError: the page cannot be written.
+        OutputError: the JSON cannot be kept.
     """
-    if config.compare:
-        table = engine_table(read_reports(config.compare))
-        if config.page is None:
-            print(table)
-        else:
-            _write(config.page, table, ENGINES_BEGIN, ENGINES_END)
-        return True
     if config.slot:
         suite_of(config.slot)
     console = Console(stderr=config.json)
@@ -86,24 +64,10 @@ def run_check(config: CheckConfig) -> bool:
         if not config.json:
             _print(console, report, whole=bool(config.use))
     _keep(reports, config)
-    if config.page is not None:
-        _write(config.page, page_table(reports), BEGIN, END)
     return all(report.passed or report.lacks is not None for report in reports)
 
 
-def show(reports: list[Report], config: Output, whole: bool) -> None:
-    """Print `reports` as `config` says; `whole`: also what is kept.
-
-    Raises:
-        OutputError: they cannot be kept.
-    """
-    if not config.json:
-        for report in reports:
-            _print(Console(), report, whole)
-    _keep(reports, config)
-
-
-def _keep(reports: list[Report], config: Output) -> None:
+def _keep(reports: list[Report], config: CheckConfig) -> None:
     text = json.dumps([_plain(report) for report in reports], indent=2)
     if config.json:
         print(text)
@@ -188,31 +152,3 @@ def _table(findings: list[Finding]) -> Table:
         said += f" {'; '.join(numbers)}." if numbers else ""
         table.add_row(Text(mark, style=style), Text(finding.check.replace("_", " ")), Text(said, style=style))
     return table
-
-
-def page_table(reports: list[Report]) -> str:
-    """Return the table of a page: one row per module, with what it keeps, breaks, and is not asked."""
-    rows = ["| slot | module | kept | broken | not asked |", "|---|---|---|---|---|"]
-    for report in reports:
-        kept = sum(finding.status == PASSED for finding in report.findings)
-        broken = ", ".join(finding.check.replace("_", " ") for finding in report.failed) or "none"
-        rest = len(report.findings) - kept - len(report.failed)
-        row = (kept, broken, rest) if report.lacks is None else ("-", report.lacks, "-")
-        rows.append(f"| `{report.slot}` | `{report.use}` | {row[0]} | {row[1]} | {row[2]} |")
-    rows += [f"| `{slot}` | `{use}` | - | not checked: {why} | - |" for (slot, use), why in UNCHECKED.items()]
-    return "\n".join(rows)
-
-
-def _write(page: Path, table: str, begin: str, end: str) -> None:
-    try:
-        text = page.read_text(encoding="utf-8")
-    except OSError as error:
-        raise ConfigError(f"The page {page} cannot be read: {error.strerror}.") from error
-    if begin not in text or end not in text.partition(begin)[2]:
-        raise ConfigError(f"The page {page} lacks the lines '{begin}' and '{end}', between which the table goes.")
-    before, _, rest = text.partition(begin)
-    _, _, after = rest.partition(end)
-    try:
-        page.write_text(f"{before}{begin}\n{table}\n{end}{after}", encoding="utf-8")
-    except OSError as error:
-        raise OutputError(f"The page {page} cannot be written: {error.strerror}.") from error

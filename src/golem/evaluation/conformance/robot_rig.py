@@ -1,9 +1,8 @@
-"""How the checks of a robot move it and hear it, whether it is an object in this process or a robot on a domain."""
+"""How the checks of a robot move it and hear it."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +10,7 @@ from numpy.typing import NDArray
 from golem.evaluation.conformance.base import Inapplicable
 from golem.hardware.servo.gains import default_gains
 from golem.robots.base import HasLidar, Robot, Unmoved
-from golem.types import NUM_JOINTS, SIDES, TICK, Array, CameraInfo, HandCommand, HandState, LowCommand, LowState, Side
+from golem.types import NUM_JOINTS, SIDES, TICK, Array, HandCommand, HandState, LowCommand, LowState, Side
 
 OPEN, GRIP = 0.08, 6.0
 """Opening of a hand that nobody asks about [m], and the ceiling on its force [N]."""
@@ -21,52 +20,13 @@ Path = Callable[[float], Array]
 """Time since the begin of a motion [s] -> (27,) joints to be sent [rad]."""
 
 
-class RobotRig(Protocol):
+class RobotRig:
     """A robot under test.
 
     Attributes:
         cameras: the cameras that it has, by name.
         calibration: see `golem.robots.base.Robot`.
     """
-
-    cameras: dict[str, CameraInfo]
-    calibration: dict[str, Array]
-
-    def follow(self, path: Path, seconds: float) -> list[LowState]:
-        """Send the joints along `path` with the gains of the servo; return the state of each tick, from time 0 on.
-
-        Raises:
-            Inapplicable: no command moves this robot.
-        """
-        ...
-
-    def rest(self, seconds: float) -> list[LowState]:
-        """Let time pass with the joints where they were sent last; return the state of each tick."""
-        ...
-
-    def grip(self, side: Side, gap: float, force: float, seconds: float) -> HandState:
-        """Send one hand to an opening [m] with a ceiling on its force [N]; return what it reports `seconds` later.
-
-        Raises:
-            Inapplicable: no command moves this robot, or it has no such hand.
-        """
-        ...
-
-    def picture(self, camera: str) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
-        """Return one exposure: (height, width, 3) colours and (height, width) depth [m], 0 where there is none."""
-        ...
-
-    def scan(self) -> NDArray[np.float32]:
-        """Return the (n, 3) points of one LiDAR scan in lidar_link [m].
-
-        Raises:
-            Inapplicable: it has no LiDAR.
-        """
-        ...
-
-
-class LockstepRig:
-    """A robot in this process; see `RobotRig`."""
 
     def __init__(self, robot: Robot, posture: Array) -> None:
         """Take hold of `robot`, which is in `posture` (27,) [rad]."""
@@ -77,7 +37,11 @@ class LockstepRig:
         self._hands: dict[Side, HandCommand] = {side: HandCommand(0.0, OPEN, GRIP) for side in SIDES}
 
     def follow(self, path: Path, seconds: float) -> list[LowState]:
-        """See `RobotRig`."""
+        """Send the joints along `path` with the gains of the servo; return the state of each tick, from time 0 on.
+
+        Raises:
+            Inapplicable: no command moves this robot.
+        """
         self._need_motion()
         begin, states = self._t, [self._state(0.0)]
         for _ in range(round(seconds / TICK)):
@@ -87,7 +51,7 @@ class LockstepRig:
         return states
 
     def rest(self, seconds: float) -> list[LowState]:
-        """See `RobotRig`."""
+        """Let time pass with the joints where they were sent last; return the state of each tick."""
         states: list[LowState] = []
         for _ in range(round(seconds / TICK)):
             self._advance()
@@ -95,18 +59,26 @@ class LockstepRig:
         return states
 
     def grip(self, side: Side, gap: float, force: float, seconds: float) -> HandState:
-        """See `RobotRig`."""
+        """Send one hand to an opening [m] with a ceiling on its force [N]; return what it reports `seconds` later.
+
+        Raises:
+            Inapplicable: no command moves this robot.
+        """
         self._need_motion()
         self._hands[side] = HandCommand(self._t, gap, force)
         self.rest(seconds)
         return self._robot.hand(side, self._t)
 
     def picture(self, camera: str) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
-        """See `RobotRig`."""
+        """Return one exposure: (height, width, 3) colours and (height, width) depth [m], 0 where there is none."""
         return self._robot.capture(camera)
 
     def scan(self) -> NDArray[np.float32]:
-        """See `RobotRig`."""
+        """Return the (n, 3) points of one LiDAR scan in lidar_link [m].
+
+        Raises:
+            Inapplicable: it has no LiDAR.
+        """
         if not isinstance(self._robot, HasLidar):
             raise Inapplicable("it has no LiDAR")
         scan = None

@@ -12,7 +12,7 @@ import numpy as np
 from golem.capabilities.arms.base import check_pose
 from golem.evaluation.conformance.base import Candidate, check
 from golem.evaluation.conformance.robot_measures import RobotMeasures
-from golem.evaluation.conformance.robot_rig import LockstepRig, RobotRig
+from golem.evaluation.conformance.robot_rig import RobotRig
 from golem.evaluation.conformance.suite import Suite
 from golem.robots.base import Robot
 from golem.runtime.contract_check import ContractCheck
@@ -47,7 +47,7 @@ class RobotSuite(RobotMeasures, Suite):
         """Return a new robot, at home."""
         robot = candidate.contract.call(candidate.make)
         try:
-            yield LockstepRig(robot, start_posture())
+            yield RobotRig(robot, start_posture())
         finally:
             robot.close()
 

@@ -155,31 +155,16 @@ class RobotLink:
         Raises:
             RosError: there is none, or it does not answer.
         """
-        return self.call(f"/safety/{what}", f"start it with: {self._dds.command('safety')}", every)
-
-    def call(self, service: str, remedy: str, every: Callable[[], None] | None = None) -> str:
-        """Call a service without arguments and return its answer; `remedy` is what helps where nobody offers it.
-
-        Raises:
-            RosError: nobody does, or it does not answer.
-        """
-        client = self._client(service)
+        service = f"/safety/{what}"
+        client = self._clients.get(service)
+        if client is None:
+            client = self._clients[service] = self._node.client(service, public.TRIGGER)
         if not self.spin(SEARCH, client.ready, every):
-            raise RosError(f"Nobody offers '{service}'; {remedy}.")
+            raise RosError(f"Nobody offers '{service}'; start it with: {self._dds.command('safety')}.")
         answer = client.call(Trigger_Request())
         if not self.spin(ANSWER, lambda: answer.done, every):
             raise RosError(f"'{service}' does not answer.")
         return str(answer.result().message)
-
-    def offered(self, service: str) -> bool:
-        """Return whether somebody is seen to offer a service without arguments."""
-        return self._client(service).ready()
-
-    def _client(self, service: str) -> Client:
-        client = self._clients.get(service)
-        if client is None:
-            client = self._clients[service] = self._node.client(service, public.TRIGGER)
-        return client
 
     def command(self, q: Array, kp: Array, kd: Array) -> None:
         """Send the gate a command that answers the newest state: (27,) each [rad], [N m/rad], [N m s/rad]."""

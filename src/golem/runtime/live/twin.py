@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -111,8 +110,6 @@ class UnansweredCalls:
 
 FOREVER = 1e9
 """A time nobody sees [s]."""
-JUMP = 1.0
-"""How far back the stamp of one state goes when somebody asks for a jump of the clock [s]."""
 
 
 class Twin:
@@ -174,8 +171,7 @@ class Twin:
             estimator = nodes.EstimatorNode(bus, *ModuleFactory(stack).make("estimator"))
             placed.append((Phase.ESTIMATE, estimator))
         incoming(bus, endpoints, lambda: self.executor.t, tell)
-        jump = partial(self._jump, bus, endpoints)
-        endpoints.serve({"/elastic_band/release": self._release, "/lowstate/jump": jump})
+        endpoints.serve({"/elastic_band/release": self._release})
         describe(endpoints, robot.calibration)
         self.executor = Executor(bus, in_order(placed))
 
@@ -189,10 +185,3 @@ class Twin:
             return Trigger_Response(False, "There is no band to let go: this robot hangs, or stands already.")
         robot.release()
         return Trigger_Response(True, "The band is let go.")
-
-    def _jump(self, bus: Bus, endpoints: RoleEndpoints, request: Any) -> Trigger_Response:
-        state = bus.latest(topics.LOW_STATE)
-        if state is None or state.t < JUMP:
-            return Trigger_Response(False, "The robot's time has just begun.")
-        endpoints.send("/lowstate", replace(state, t=state.t - JUMP))
-        return Trigger_Response(True, f"One state was stamped {JUMP:g} s early.")

@@ -1,41 +1,40 @@
-"""Kept reports of robots side by side: what each promise measured, and how far the courses over time are apart."""
+"""Writes reports of `golem check --save` into a page, between its two marks, as one table.
+
+    python scripts/check_page.py modules docs/how-to/check-a-module.md all.json
+    python scripts/check_page.py engines docs/how-to/engines.md mujoco.json physx.json ...
+
+`modules`: a row per module, with what it keeps, breaks, and is not asked. `engines`: robots side by side, with what
+each promise measured, and how far their courses over time are apart.
+"""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from golem.errors import ConfigError
 from golem.evaluation.conformance.base import FAILED, PASSED
+from golem.evaluation.conformance.examine import UNCHECKED
 
-BEGIN, END = "<!-- golem check --compare: begin -->", "<!-- golem check --compare: end -->"
-"""Between these lines of a page stands the table."""
+MARKS = {"modules": "golem check", "engines": "golem check --compare"}
 Findings = dict[str, dict[str, Any]]
 
 
-def read_reports(files: Sequence[Path]) -> dict[str, Findings]:
-    """Return the findings of the one report in each file, by check, by the file's name without its ending.
-
-    Raises:
-        ConfigError: a file is no report of one module, or two have one name.
-    """
-    reports: dict[str, Findings] = {}
-    for path in files:
-        try:
-            (report,) = json.loads(path.read_text(encoding="utf-8"))
-            findings = {finding["check"]: finding for finding in report["findings"]}
-        except (OSError, ValueError, KeyError, TypeError) as error:
-            raise ConfigError(
-                f"'{path}' is no report of one module; write one with: golem check robot NAME --save {path}."
-            ) from error
-        if path.stem in reports:
-            raise ConfigError(f"Two reports are called '{path.stem}': rename one of the files.")
-        reports[path.stem] = findings
-    return reports
+def module_table(reports: list[dict[str, Any]]) -> str:
+    """Return the table of all modules."""
+    rows = ["| slot | module | kept | broken | not asked |", "|---|---|---|---|---|"]
+    for report in reports:
+        kept = sum(finding["status"] == PASSED for finding in report["findings"])
+        failed = [f["check"].replace("_", " ") for f in report["findings"] if f["status"] == FAILED]
+        rest = len(report["findings"]) - kept - len(failed)
+        lacks = report.get("lacks")
+        row = (kept, ", ".join(failed) or "none", rest) if lacks is None else ("-", lacks, "-")
+        rows.append(f"| `{report['slot']}` | `{report['use']}` | {row[0]} | {row[1]} | {row[2]} |")
+    rows += [f"| `{slot}` | `{use}` | - | not checked: {why} | - |" for (slot, use), why in UNCHECKED.items()]
+    return "\n".join(rows)
 
 
 def engine_table(reports: dict[str, Findings]) -> str:
@@ -88,3 +87,28 @@ def _apart(course: list[float], finding: dict[str, Any] | None, name: str) -> st
         return "-"
     a, b = np.array(course), np.array(other, float)
     return f"{100.0 * float(np.abs(a - b).max() / np.abs(a).max()):.2g} %"
+
+
+def placed(page: str, table: str, mark: str) -> str:
+    """Return the text of a page with a table between its marks."""
+    begin, end = f"<!-- {mark}: begin -->", f"<!-- {mark}: end -->"
+    before, found, rest = page.partition(begin)
+    _, also, after = rest.partition(end)
+    if not (found and also):
+        raise SystemExit(f"The page lacks the lines '{begin}' and '{end}'.")
+    return f"{before}{begin}\n{table}\n{end}{after}"
+
+
+def main(kind: str, page: str, *files: str) -> None:
+    """Write the table of a kind into a page."""
+    reports = {Path(file).stem: json.loads(Path(file).read_text(encoding="utf-8")) for file in files}
+    if kind == "modules":
+        table = module_table([report for rows in reports.values() for report in rows])
+    else:
+        table = engine_table({name: {f["check"]: f for f in rows[0]["findings"]} for name, rows in reports.items()})
+    path = Path(page)
+    path.write_text(placed(path.read_text(encoding="utf-8"), table, MARKS[kind]), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
