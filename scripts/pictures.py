@@ -23,7 +23,7 @@ PULLED = 1.15
 
 
 def take(folder: Path, stack: Stack, seed: int = 0) -> list[Path]:
-    """Write `pull.png` and `pick.gif`: the second pick, whose screw no tray hides.
+    """Write `pull.png` and `pick.webp`: the second pick, whose screw no tray hides.
 
     Args:
         folder: where to.
@@ -64,13 +64,13 @@ def take(folder: Path, stack: Stack, seed: int = 0) -> list[Path]:
         pick(lambda: recorder(running.executor.t))
         timeline = Timeline.of(running)
         pick(watch)
-        gif, *rest = film.save(folder / "pick.gif")
+        film_file, *rest = film.save(folder / "pick.webp")
         for other in rest:
             other.unlink()
     finally:
         film.close()
         robot.close()
-    return [picture, gif]
+    return [picture, film_file]
 
 
 if __name__ == "__main__":

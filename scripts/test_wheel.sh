@@ -19,4 +19,4 @@ done
 uv pip install --quiet --python "$empty/venv/bin/python" --no-deps "$empty"/dist/*.whl
 cd "$empty"
 venv/bin/golem demo --stack tether --screws 1 --headless --out demo
-ls -l demo/report.html demo/*.gif
+ls -l demo/report.html demo/*.webp

@@ -136,10 +136,10 @@ def test_the_page_names_every_pick_and_escapes_what_it_quotes() -> None:
         PickRecord(False, None, "extract", "It <slipped>.", 8.5, 5.0, [("detect", 0.1), ("extract", 1.0)]),
     ]
     poster = np.zeros((9, 16, 3), np.uint8)
-    page = demo_page("1 of 2", picks, None, ["demo.gif", "demo.mp4"], poster, {"command": "golem demo"}, [])
+    page = demo_page("1 of 2", picks, None, ["demo.webp", "demo.mp4"], poster, {"command": "golem demo"}, [])
     assert "screw_09 in the tray" in page and "lost in extract" in page
     assert "<slipped>" not in page and "&lt;slipped&gt;" in page
-    assert 'src="demo.mp4"' in page and 'href="demo.gif"' in page
+    assert 'src="demo.mp4"' in page and 'href="demo.webp"' in page
     assert 'poster="data:image/jpeg;base64,' in page, "the film shows something before it is played"
     assert "http" not in page  # needs no network
 

@@ -16,7 +16,7 @@ FILE = re.compile(r"[\w./-]+\.(?:py|sh)")
 NAME = re.compile(r"(?:golem\.)?((?:[a-z_][a-z0-9_]*\.)+)([A-Za-z_]\w*)")
 FOREIGN = {"mujoco", "model", "estop"}
 """Names that MuJoCo, its objects and options share with folders of ours."""
-SUFFIXES = {"gif", "html", "json", "jsonl", "npz", "onnx", "txt", "yaml"}
+SUFFIXES = {"html", "json", "jsonl", "npz", "onnx", "txt", "webp", "yaml"}
 OF_OTHERS = {"grasp_gen/serving/zmq_server.py", "isaaclab_ov/assets/articulation/articulation.py"}
 """Files of other repositories, in the words of those who cite them."""
 

@@ -89,7 +89,7 @@ class DemoResult:
             truth, and whether it stood again after the push at the film's end.
         picks: each attempt.
         screws: the screws in the tray.
-        films: the films, the GIF first; empty with the live view.
+        films: the films, the WebP first; empty with the live view.
         report: the HTML page; None where what draws it is not installed.
     """
 
@@ -334,7 +334,7 @@ def _filmed(config: DemoConfig, demo: Demo, running: LockstepRunner, robot: Mujo
             film.headline = f"A push of {SHOVE.impulse:.0f} N s"
             demo.push(watch)
         print(f"Writing the film ({len(film)} pictures): a minute or two.", flush=True)
-        return demo.write(film.save(config.out / "demo.gif"), film.picture(len(film) // 3))
+        return demo.write(film.save(config.out / "demo.webp"), film.picture(len(film) // 3))
     finally:
         film.close()
 

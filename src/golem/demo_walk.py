@@ -72,7 +72,7 @@ def run_walk_demo(config: DemoConfig) -> bool:
                     figures = _errand(running, robot, contacts, running.execute, filmed)
                     film.frame(running)
                     print(f"Writing the film ({len(film)} pictures).", flush=True)
-                    films = film.save(config.out / "walk.gif")
+                    films = film.save(config.out / "walk.webp")
             else:
                 with LiveView(running, robot, config.port) as view:
                     print(f"Watch it at {view.url}.", flush=True)

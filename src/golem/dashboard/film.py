@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 import tempfile
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,7 @@ from tqdm import tqdm
 
 from golem.dashboard.balance_chart import SPAN, balance_chart
 from golem.dashboard.map_view import map_view
-from golem.dashboard.status import CLASS_COLOURS, Status, camera_picture, read_status
+from golem.dashboard.status import Status, camera_picture, read_status
 from golem.errors import OutputError
 from golem.interfaces import topics
 from golem.interfaces.payloads import GateState
@@ -41,16 +40,10 @@ CLOSE_STAGES = ("descend", "servo", "grasp", "extract")
 """Stages that are filmed from near; the others are filmed wide."""
 OVERSAMPLING = 4 / 3
 """Pictures are rendered larger than shown by this: smooth edges at a third of the price of multisampling."""
-GIF_SCALE = 2 / 3
-"""Size of a GIF's pictures, relative to the film's."""
-GIF_FRAMES = 240
-"""A film with more pictures than this drops some in its GIF."""
-STILL = 6
-"""Change of a colour, of 255, below which a GIF's pixel stays what it was."""
-UNCHANGED = 255
-"""Palette index of a GIF's transparent colour."""
-MAX_GIF = 8_000_000
-"""Size above which a GIF is written again, smaller [bytes]."""
+WEBP_SCALE, QUALITY = 2 / 3, 60
+"""Size of an animated WebP's pictures, relative to the film's, and their quality, of 100."""
+WEBP_FRAMES = 240
+"""A film with more pictures than this leaves some out there."""
 CHART = (230, 64)
 """Size of the chart of the CoM margin in a film of 540 lines [px]."""
 PANEL = (16, 20, 27)
@@ -177,13 +170,13 @@ class Film:
         return np.asarray(image)
 
     def save(self, path: Path) -> list[Path]:
-        """Write the film as an animated GIF, and in full beside it as MP4 where this machine can encode that.
+        """Write the film as an animated WebP, and in full beside it as MP4 where this machine can encode that.
 
         Args:
-            path: the GIF; the other file gets its name with another suffix.
+            path: the WebP; the other file gets its name with another suffix.
 
         Returns:
-            The files written, the GIF first. Each appears complete or not at all.
+            The files written, the WebP first. Each appears complete or not at all.
 
         Raises:
             OutputError: there is no picture yet, or the file cannot be written.
@@ -193,13 +186,9 @@ class Film:
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             with tempfile.TemporaryDirectory(dir=path.parent, prefix=".film-") as folder:
-                gif, video = Path(folder) / "film.gif", Path(folder) / "film.mp4"
-                scale = GIF_SCALE
-                self._write_gif(gif, scale)
-                while gif.stat().st_size > MAX_GIF and scale > 0.2:
-                    scale *= min(0.9, 0.97 * float(np.sqrt(MAX_GIF / gif.stat().st_size)))
-                    self._write_gif(gif, scale)
-                os.replace(gif, path)
+                small, video = Path(folder) / "film.webp", Path(folder) / "film.mp4"
+                self._write_webp(small)
+                os.replace(small, path)
                 written = [path]
                 if self._write_video(video):
                     os.replace(video, path.with_suffix(".mp4"))
@@ -216,40 +205,14 @@ class Film:
             picture = _resized(picture, (round(self._size[0] * scale), round(self._size[1] * scale)))
         return np.ascontiguousarray(picture[..., ::-1]).astype(np.uint8, copy=False)
 
-    def _write_gif(self, path: Path, scale: float) -> None:
-        """Write the pictures with one palette; a pixel that hardly changes stays, so that only what moves is stored."""
-        count = len(self._frames)
-        samples = [self.picture(i, 0.25) for i in np.unique(np.linspace(0, count - 1, 24).astype(int))]
-        accents = [ACCENT, *SAFETY_COLOURS.values(), *CLASS_COLOURS.values()]
-        samples.append(np.resize(np.array(accents, np.uint8), (24, samples[0].shape[1], 3)))
-        palette = Image.fromarray(np.concatenate(samples)).quantize(UNCHANGED, method=Image.Quantize.MEDIANCUT)
-        nearest = _nearest_colour(palette)
-        stride = math.ceil(count / GIF_FRAMES)
-
-        def indexed() -> Iterator[Image.Image]:
-            shown = np.full((1, 1, 3), -1000, np.int16)
-            index = np.zeros((1, 1), np.uint8)
-            for i in tqdm(range(0, count, stride), path.name, leave=False, disable=None):
-                picture = self.picture(i, scale)
-                r, g, b = (picture[..., c] >> 2 for c in range(3))
-                changed = np.abs(picture - shown).max(axis=2) > STILL
-                index = np.where(changed, nearest[r, g, b], index)
-                shown = np.where(changed[..., None], picture, shown).astype(np.int16)
-                image = Image.fromarray(index)
-                image.putpalette(palette.getpalette() or [])
-                yield image
-
-        images = indexed()
-        next(images).save(
-            path,
-            format="GIF",
-            save_all=True,
-            append_images=images,
-            duration=round(1000.0 * stride / self.fps),
-            loop=0,
-            disposal=1,
-            transparency=UNCHANGED,
-            optimize=True,  # stores what did not change as transparent
+    def _write_webp(self, path: Path) -> None:
+        """Write the pictures, some left out of a long film, smaller than they are."""
+        stride = math.ceil(len(self._frames) / WEBP_FRAMES)
+        numbers = tqdm(range(0, len(self._frames), stride), path.name, leave=False, disable=None)
+        first, *others = (Image.fromarray(self.picture(i, WEBP_SCALE)) for i in numbers)
+        duration = round(1000.0 * stride / self.fps)
+        first.save(
+            path, "WEBP", save_all=True, append_images=others, duration=duration, loop=0, method=2, quality=QUALITY
         )
 
     def _write_video(self, path: Path) -> bool:
@@ -269,10 +232,3 @@ class Film:
 
 def _resized(picture: NDArray[Any], size: tuple[int, int]) -> NDArray[np.uint8]:
     return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
-
-
-def _nearest_colour(palette: Image.Image) -> NDArray[np.uint8]:
-    """Return (64, 64, 64) the index of the palette's nearest colour, by the upper six bits of red, green, blue."""
-    r, g, b = np.meshgrid(*[np.arange(2, 256, 4, dtype=np.uint8)] * 3, indexing="ij")
-    every = Image.fromarray(np.stack([r, g, b], axis=-1).reshape(512, 512, 3))
-    return np.asarray(every.quantize(palette=palette, dither=Image.Dither.NONE)).reshape(64, 64, 64)

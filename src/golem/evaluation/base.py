@@ -84,7 +84,7 @@ class TrialOutcome:
         module: `"slot: implementation"` that lost the success; None on success or where none is to blame.
         detail: one sentence for the person who reads the failure.
         timings: name -> robot seconds, e.g. `detect_to_grasp`; a time that was not reached is left out.
-        series: name -> summary scalar of the trial, SI units, e.g. `grasp_error`; see `metric_names.METRICS`.
+        series: name -> summary scalar of the trial, SI units, e.g. `grasp_error`; see `metrics.yaml`.
         picture: PNG of the decisive moment, or None.
         trace: where in its code a module failed, as Python prints it; None where none raised.
         costs: name -> scalar that depends on the machine, e.g. CPU time [s]; never part of the record.

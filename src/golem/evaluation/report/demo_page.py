@@ -72,7 +72,7 @@ def demo_page(
         picture=_jpeg(picture),
         films=films,
         video=next((name for name in films if name.endswith(".mp4")), None),
-        gif=next((name for name in films if name.endswith(".gif")), None),
+        webp=next((name for name in films if name.endswith(".webp")), None),
         poster=_jpeg(poster),
         balance=balance,
     )
