@@ -123,7 +123,6 @@ def _bench(words: list[str]) -> int:
 
 BENCHES = {
     "arms": ("golem.evaluation.speed.arms_bench", "ArmsBenchConfig", "run_arms_bench"),
-    "dds": ("golem.evaluation.speed.dds_bench", "DdsBenchConfig", "run_dds_bench"),
     "grasp": ("golem.evaluation.speed.grasp_bench", "GraspBenchConfig", "run_grasp_bench"),
     "localizer": ("golem.evaluation.speed.localizer_bench", "LocalizerBenchConfig", "run_localizer_bench"),
     "loop": ("golem.evaluation.speed.loop_bench", "LoopBenchConfig", "run_loop_bench"),

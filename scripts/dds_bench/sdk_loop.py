@@ -1,4 +1,4 @@
-"""The same two sides as `dds_loop`, by the vendor's own classes: a script that needs unitree_sdk2py, and not GOLEM.
+"""The same two sides as `loop`, by the vendor's own classes: a script that needs unitree_sdk2py, and not GOLEM.
 
 It runs in any Python that can import the SDK, so it imports nothing else. The SDK has no checks to leave out: states
 go without checksum, as in the vendor's simulator, commands with it, as in its examples. States of number 0 come before

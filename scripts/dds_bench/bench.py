@@ -1,4 +1,7 @@
-"""`golem bench dds`: the 500 Hz loop of states and commands between two processes, ours next to the vendor's SDK."""
+"""The 500 Hz loop of states and commands between two processes, ours next to the vendor's SDK.
+
+python scripts/dds_bench/bench.py --seconds 60 --sdk CHECKOUT
+"""
 
 from __future__ import annotations
 
@@ -14,6 +17,7 @@ from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
+import tyro
 from rich.console import Console
 from rich.table import Table
 
@@ -22,7 +26,7 @@ from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.dds.library import cyclone
 from golem.types import Array
 
-GOLEM = (sys.executable, "-m", "golem.evaluation.speed.dds_loop")
+GOLEM = (sys.executable, str(Path(__file__).with_name("loop.py")))
 SDK_SCRIPT = Path(__file__).with_name("sdk_loop.py")
 PERIOD = 0.002
 TARGETS = "0 lost, median latency 150 us, robot 20 % of a core without images, 3 ms per image"
@@ -251,3 +255,10 @@ def _print(loops: Iterable[Loop]) -> None:
 
 def _pair(values: tuple[float, float] | None, digits: int) -> str:
     return "" if values is None else f"{values[0]:.{digits}f} / {values[1]:.{digits}f}"
+
+
+if __name__ == "__main__":
+    try:
+        run_dds_bench(tyro.cli(DdsBenchConfig))
+    except GolemError as error:
+        sys.exit(f"golem: {error}")

@@ -8,8 +8,9 @@ import pytest
 
 pytest.importorskip("cyclonedds")
 
+from scripts.dds_bench.bench import BenchFailed, DdsBenchConfig, _measures, run_dds_bench
+
 from golem.errors import ConfigError
-from golem.evaluation.speed.dds_bench import BenchFailed, DdsBenchConfig, _measures, run_dds_bench
 
 
 def test_losses_latency_and_jitter_are_those_of_what_came() -> None:

@@ -1,4 +1,4 @@
-"""One process of `golem bench dds`: the robot's or the controller's side of a 500 Hz loop, or a viewer of images.
+"""One process of the bench: the robot's or the controller's side of a 500 Hz loop, or a viewer of images.
 
 The robot's side encodes a state with checksum, writes it and takes commands; the controller decodes each state as it
 comes and answers it. States have numbers from 1; those with number 0 come before and are not measured: who has found
