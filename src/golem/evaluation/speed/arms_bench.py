@@ -1,4 +1,4 @@
-"""`golem bench arms`: collision checks, ticks of inverse kinematics and plans, in CPU time of this thread."""
+"""`golem bench arms`: collision checks and plans, in CPU time of this thread."""
 
 from __future__ import annotations
 
@@ -11,15 +11,13 @@ from numpy.typing import NDArray
 from rich.console import Console
 
 from golem.capabilities.arms.arm_kinematics import UpperKinematics
-from golem.capabilities.arms.diff_ik import DiffIK
 from golem.capabilities.arms.postures import posture
-from golem.capabilities.arms.task_space import TaskSpaceConfig
 from golem.capabilities.collision.collision_model import CollisionModel
 from golem.capabilities.collision.mesh_oracle import MeshOracle
 from golem.capabilities.collision.pack_robot import our_robot
 from golem.capabilities.collision.sphere_robot import load_spheres
-from golem.errors import ConfigError, MissingExtra
-from golem.evaluation.speed.bench import Figure, figure, ik_figure, print_figures, timed
+from golem.errors import ConfigError
+from golem.evaluation.speed.bench import Figure, figure, print_figures, timed
 from golem.evaluation.speed.plan_bench import planning_table, whole_posture
 from golem.robots.model.table import JOINT_NAMES
 from golem.types import UPPER, Array
@@ -30,12 +28,10 @@ NEAR = 0.02
 
 @dataclass(frozen=True)
 class ArmsBenchConfig:
-    """Time collision checks, inverse kinematics and plans, and count what spheres and planner get wrong."""
+    """Time collision checks and plans, and count what spheres and planner get wrong."""
 
     postures: int = 10000
     """Postures of torso and arms: a third around `ready`, a third anywhere, a third of them near contact."""
-    ticks: int = 4000
-    """Ticks of inverse kinematics."""
     plans: int = 500
     """Planning queries; 0 leaves the planning table out."""
     seed: int = 0
@@ -50,8 +46,8 @@ def run_arms_bench(config: ArmsBenchConfig) -> list[Figure]:
     Raises:
         ConfigError: a number is out of range.
     """
-    if config.postures < 9 or config.ticks < 1 or min(config.seed, config.plans) < 0:
-        raise ConfigError("--postures must be 9 or more, --ticks 1 or more, --plans and --seed 0 or more.")
+    if config.postures < 9 or min(config.seed, config.plans) < 0:
+        raise ConfigError("--postures must be 9 or more, --plans and --seed 0 or more.")
     robot = load_spheres()
     model = CollisionModel(robot, JOINT_NAMES[UPPER])
     Q = bench_postures(model, config.postures, config.seed)
@@ -77,18 +73,6 @@ def run_arms_bench(config: ArmsBenchConfig) -> list[Figure]:
         figure("collision, our kernel, batch", each, 1e6, "us", "0.5 us wanted"),
         figure("six nearest pairs and their gradients", near, 1e6, "us", ""),
     ]
-    for name, options in (
-        ("diff_ik", TaskSpaceConfig(collision_rows=0)),
-        ("diff_ik, 6 rows", TaskSpaceConfig(collision_rows=6)),
-    ):
-        wanted = "300 us wanted" if options.collision_rows else "70 us wanted"
-        figures.append(ik_figure(f"IK tick, {name}", DiffIK(options), config.ticks, wanted))
-    try:
-        from golem.capabilities.arms.pink_ik import PinkIK
-
-        figures.append(ik_figure("IK tick, pink_ik", PinkIK(), config.ticks, "137 us: prototype of Pink + daqp"))
-    except MissingExtra as error:
-        Console().print(f"pink_ik left out: {error}")
     missed, false = int((truth & ~found).sum()), int((found & ~truth).sum())
     print_figures(figures)
     Console().print(

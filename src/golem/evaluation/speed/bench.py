@@ -108,7 +108,7 @@ def figure(name: str, times: Array, scale: float, unit: str, reference: str) -> 
 
 def _control(config: BenchConfig) -> list[Figure]:
     n = 1000 if config.quick else 20000
-    figures = [ik_figure("IK tick, diff_ik", DiffIK(), min(n, 4000), "300 us wanted, with collision rows")]
+    figures = [ik_figure("IK tick, diff_ik", DiffIK(), min(n, 4000), "300 us wanted")]
     try:
         from golem.capabilities.arms.pink_ik import PinkIK
 
