@@ -27,7 +27,7 @@ probe() {
         cluster) echo "from golem.evaluation.harness.trial_executor import DaskExecutor; DaskExecutor('no scheduler')" ;;
         lidar) echo "from golem.registry import create; create('odometry', 'kiss_icp', {}); create('odometry', 'rko_lio', {})" ;;
         view) echo "from golem.dashboard.server import serve; serve('127.0.0.1', 0).stop()" ;;
-        physx) echo "from golem.robots.physx.bodies import load_sapien; load_sapien()" ;;
+        physx) echo "from golem.robots.physx.physx_robot import load_sapien; load_sapien()" ;;
         *) echo "There is no extra '$1' to try." >&2; exit 2 ;;
     esac
 }

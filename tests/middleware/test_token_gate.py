@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import pytest
 
 from golem.errors import ConfigError
-from golem.middleware import relay
+from golem.middleware import web_gate
 from golem.middleware.web_gate import TokenGate, is_loopback
 
 
@@ -96,14 +96,14 @@ def test_who_sends_slowly_takes_no_thread_and_keeps_nobody_out(
     gate: TokenGate, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     before = threading.active_count()
-    slow = [socket.create_connection(("127.0.0.1", gate.port), 5.0) for _ in range(3 * relay.PENDING)]
-    for connection in slow[-relay.PENDING :]:
+    slow = [socket.create_connection(("127.0.0.1", gate.port), 5.0) for _ in range(3 * web_gate.PENDING)]
+    for connection in slow[-web_gate.PENDING :]:
         connection.sendall(b"G")
     assert ask(gate, f"/?token={gate.token}").endswith("hello")
     assert threading.active_count() <= before + 3
     slow[0].settimeout(5.0)
     assert slow[0].recv(1) == b""  # the oldest were ended
-    monkeypatch.setattr(relay, "PATIENCE", -1.0)
+    monkeypatch.setattr(web_gate, "PATIENCE", -1.0)
     late = socket.create_connection(("127.0.0.1", gate.port), 5.0)
     assert late.recv(1) == b""
     for connection in (*slow, late):

@@ -4,7 +4,7 @@ import pytest
 
 pytest.importorskip("rosbags")
 
-from golem.evaluation.speed.gate_bench import check_ticks, gate_ticks
+from golem.evaluation.speed.bench import check_ticks, gate_ticks
 
 
 def test_ticks_of_an_active_gate_are_timed() -> None:

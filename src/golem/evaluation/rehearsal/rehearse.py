@@ -4,20 +4,141 @@ from __future__ import annotations
 
 import json
 import tempfile
+import threading
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from golem.errors import ConfigError, unknown_name
-from golem.evaluation.rehearsal.miswired_twin import FAULTS
-from golem.evaluation.rehearsal.scripted_person import ScriptedPerson
+from golem.evaluation.rehearsal.miswired_twin import FAULTS, reported
+from golem.hardware.servo.gains import default_gains
+from golem.interfaces import public
+from golem.middleware.dds.base import Qos
 from golem.middleware.dds.domain import DdsConfig
+from golem.middleware.ros import names
+from golem.middleware.ros.codec import dds_name
 from golem.middleware.ros.future import RosError
-from golem.runtime.bringup.base import BringupConfig
+from golem.middleware.ros.msgs.std_srvs import SetBool_Request
+from golem.middleware.wire import convert
+from golem.middleware.wire.struct_layout import WireError
+from golem.robots.model.table import JOINTS
+from golem.runtime.bringup.base import Act, BringupConfig, Task
 from golem.runtime.bringup.bringup_command import CHECKS, run_bringup
 from golem.runtime.bringup.bringup_report import FILE
 from golem.runtime.bringup.robot_link import RobotLink
 from golem.runtime.live.launch import Process
 from golem.runtime.live.node_setup import log_line, member
+from golem.runtime.live.operator import ask
+from golem.types import TICK, LowCommand, LowState
+
+ANGLE = 0.2
+"""How far a joint is moved by hand [rad]."""
+PACE = 0.4
+"""How fast [rad/s]."""
+
+
+class MovingHand:
+    """A hand on a twin: its motors, before any gate is there, hold it and move one joint."""
+
+    def __init__(self, dds: DdsConfig, fault: str) -> None:
+        """Take hold of the twin on the domain, which reports with `fault`."""
+        self._dds, self._fault = dds, fault
+        self._goal: tuple[int, float] | None = None
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="hand", daemon=True)
+        self._thread.start()
+
+    def move(self, joint: int, by: float) -> None:
+        """Move a joint `by` [rad] from where it was when the hand took hold."""
+        self._goal = (joint, by)
+
+    def back(self) -> None:
+        """Put everything back."""
+        self._goal = None
+
+    def close(self) -> None:
+        """Let go for good."""
+        self._over.set()
+        self._thread.join()
+
+    def _run(self) -> None:
+        gains = default_gains()
+        row, out = public.topic("/lowstate"), public.topic("/lowcmd")
+        with member("hand", self._dds) as (participant, _):
+            reader = participant.reader(names.topic(row.name), dds_name(row.type), Qos(reliable=False, depth=8))
+            writer = participant.writer(names.topic(out.name), dds_name(out.type), out.qos)
+            hold = at = None
+            t = 0.0
+            while not self._over.wait(TICK):
+                state = _newest(reader.take)
+                if state is None:
+                    continue
+                if hold is None or at is None:
+                    # Inside the range, so that nothing leans on its end.
+                    q = reported(self._fault, state.q)
+                    hold = np.clip(q, [j.lower + 0.02 for j in JOINTS], [j.upper - 0.02 for j in JOINTS])
+                    at, t = hold.copy(), state.t
+                wanted = hold.copy()
+                if self._goal is not None:
+                    wanted[self._goal[0]] += self._goal[1]
+                step = PACE * max(0.0, state.t - t)
+                at, t = at + np.clip(wanted - at, -step, step), state.t
+                zero = np.zeros_like(at)
+                command = LowCommand(t=state.t, q=at, dq=zero, tau=zero, kp=gains.kp, kd=gains.kd)
+                writer.write(convert.encode_low_command(command, convert.MODE_MACHINE))
+
+
+class ScriptedPerson:
+    """A person who does at once, and without a mistake, what is asked."""
+
+    def __init__(self, dds: DdsConfig, fault: str, tell: Callable[[str], None] = log_line) -> None:
+        """Stand beside the twin on the domain that has `fault`."""
+        self._dds, self._fault, self._say = dds, fault, tell
+        self._hand: MovingHand | None = None
+
+    def tell(self, text: str) -> None:
+        """Hear something."""
+        self._say(text)
+
+    def confirm(self, question: str, word: str) -> bool:
+        """Say the word."""
+        return True
+
+    def act(self, task: Task) -> None:
+        """Do it."""
+        if task.act is Act.MOVE:
+            self._hand = self._hand or MovingHand(self._dds, self._fault)
+            self._hand.move(task.joint, ANGLE if task.positive else -ANGLE)
+        elif task.act is Act.LET_GO and self._hand is not None:
+            self._hand.back()
+            if task.joint == len(JOINTS) - 1:
+                self.leave()
+        elif task.act in (Act.PRESS, Act.RELEASE) and self._fault != "silent_estop":
+            self._press(task.act is Act.PRESS)
+
+    def leave(self) -> None:
+        """Let go of the robot."""
+        if self._hand is not None:
+            self._hand.close()
+            self._hand = None
+
+    def _press(self, pressed: bool) -> None:
+        with member("button", self._dds) as (_, node):
+            ask(node, "/estop/press", "std_srvs/srv/SetBool", SetBool_Request(pressed), "start the gate")
+
+
+def _newest(take: Callable[[int], list]) -> LowState | None:  # type: ignore[type-arg]
+    newest = None
+    for sample in take(64):
+        if sample.alive:
+            newest = sample.payload
+    try:
+        return None if newest is None else convert.decode_low_state(newest)
+    except WireError:
+        return None
+
 
 START = 180.0
 """How long the twin's start is waited for [s]."""
