@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +16,7 @@ from golem.capabilities.collision.mesh_oracle import MeshOracle
 from golem.capabilities.collision.pack_robot import our_robot
 from golem.capabilities.collision.sphere_robot import load_spheres
 from golem.errors import ConfigError
-from golem.evaluation.speed.bench import Figure, figure, print_figures, timed
+from golem.evaluation.speed.bench import BenchOutput, Figure, figure, print_figures, timed
 from golem.evaluation.speed.plan_bench import planning_table, whole_posture
 from golem.robots.model.table import JOINT_NAMES
 from golem.types import UPPER, Array
@@ -27,17 +26,13 @@ NEAR = 0.02
 
 
 @dataclass(frozen=True)
-class ArmsBenchConfig:
+class ArmsBenchConfig(BenchOutput):
     """Time collision checks and plans, and count what spheres and planner get wrong."""
 
     postures: int = 10000
     """Postures of torso and arms: a third around `ready`, a third anywhere, a third of them near contact."""
     plans: int = 500
     """Planning queries; 0 leaves the planning table out."""
-    seed: int = 0
-    """Of the postures and the queries."""
-    json: bool = False
-    """Print the figures as a last line of JSON."""
 
 
 def run_arms_bench(config: ArmsBenchConfig) -> list[Figure]:
@@ -81,9 +76,7 @@ def run_arms_bench(config: ArmsBenchConfig) -> list[Figure]:
     )
     if config.plans:
         figures += planning_table(config.plans, config.seed)
-    if config.json:
-        print(json.dumps([asdict(f) for f in figures]))
-    return figures
+    return config.told(figures)
 
 
 def bench_postures(model: CollisionModel, n: int, seed: int) -> Array:

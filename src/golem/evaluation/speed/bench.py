@@ -45,18 +45,6 @@ from golem.stack import load_stack
 from golem.types import NUM_JOINTS, TICK, UPPER, Array, BaseEstimate, Imu, LowCommand, LowState, RgbdImage
 
 
-@dataclass(frozen=True)
-class BenchConfig:
-    """Print every performance figure next to its reference, in CPU time."""
-
-    quick: bool = False
-    """Fewer repetitions."""
-    seed: int = 0
-    """Seed of the episodes."""
-    json: bool = False
-    """Print the figures as a last line of JSON."""
-
-
 @dataclass(frozen=True, slots=True)
 class Figure:
     """One measured figure.
@@ -75,6 +63,30 @@ class Figure:
     reference: str
 
 
+@dataclass(frozen=True, kw_only=True)
+class BenchOutput:
+    """What every bench is asked."""
+
+    seed: int = 0
+    """Of what is drawn."""
+    json: bool = False
+    """Print the figures as a last line of JSON."""
+
+    def told(self, figures: list[Figure]) -> list[Figure]:
+        """Return the figures, which are printed as JSON where that is asked for."""
+        if self.json:
+            print(json.dumps([asdict(f) for f in figures]))
+        return figures
+
+
+@dataclass(frozen=True)
+class BenchConfig(BenchOutput):
+    """Print every performance figure next to its reference, in CPU time."""
+
+    quick: bool = False
+    """Fewer repetitions."""
+
+
 def run_bench(config: BenchConfig) -> list[Figure]:
     """Measure and print.
 
@@ -85,16 +97,12 @@ def run_bench(config: BenchConfig) -> list[Figure]:
         raise ConfigError(f"--seed is {config.seed}; it must be 0 or more.")
     figures = [*_control(config), *_physics(config), *_perception(config), *_navigation(config), *_robot(config)]
     print_figures(figures)
-    if config.json:
-        print(json.dumps([asdict(f) for f in figures]))
-    return figures
+    return config.told(figures)
 
 
-def print_figures(
-    figures: Sequence[Figure], title: str = "GOLEM, CPU time of one thread", reference: str = "reference"
-) -> None:
-    """Print a table of figures under a title; `reference` is the head of what they are compared with."""
-    table = Table("figure", "median", "p99", "unit", reference, title=title)
+def print_figures(figures: Sequence[Figure], title: str = "GOLEM, CPU time of one thread") -> None:
+    """Print a table of figures under a title."""
+    table = Table("figure", "median", "p99", "unit", "reference", title=title)
     for f in figures:
         table.add_row(f.name, f"{f.median:.3g}", f"{f.p99:.3g}", f.unit, f.reference)
     Console().print(table)

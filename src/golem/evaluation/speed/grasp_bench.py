@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 from rich.console import Console
@@ -15,7 +14,7 @@ from golem.capabilities.arms.postures import POSTURES
 from golem.capabilities.grasping.base import Grasp, GraspMethod, Gripper
 from golem.capabilities.grasping.scorer import Scorer
 from golem.errors import ConfigError, GolemError
-from golem.evaluation.speed.bench import Figure, figure, timed
+from golem.evaluation.speed.bench import BenchOutput, Figure, figure, timed
 from golem.robots.worlds.tableware import KINDS
 from golem.types import Array, Detection, LocalizedObject
 
@@ -33,7 +32,7 @@ REFERENCES = {
 
 
 @dataclass(frozen=True)
-class GraspBenchConfig:
+class GraspBenchConfig(BenchOutput):
     """Time grasp methods on clouds of tableware and of a handle, and count what they propose."""
 
     methods: tuple[str, ...] = ("centroid", "antipodal", "scorer", "reranked")
@@ -44,10 +43,6 @@ class GraspBenchConfig:
     """Clouds of each thing."""
     noise: float = 0.002
     """Standard deviation of the points [m]."""
-    seed: int = 0
-    """Of the clouds."""
-    json: bool = False
-    """Print the figures as a last line of JSON."""
 
 
 def run_grasp_bench(config: GraspBenchConfig) -> list[Figure]:
@@ -80,9 +75,7 @@ def run_grasp_bench(config: GraspBenchConfig) -> list[Figure]:
                 table.add_row("scorer alone", thing, f"{1e3 * np.median(times):.1f}", f"{count:g}", "")
                 figures.append(figure(f"scorer alone, {thing}", times, 1e3, "ms", REFERENCES["scorer alone"]))
     console.print(table)
-    if config.json:
-        print(json.dumps([asdict(one) for one in figures]))
-    return figures
+    return config.told(figures)
 
 
 def _measure(

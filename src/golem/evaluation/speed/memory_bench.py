@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import os
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -15,7 +14,7 @@ from golem.capabilities.memory.base import Observation
 from golem.capabilities.memory.object_map import ObjectMap, ObjectMapConfig
 from golem.capabilities.memory.words import SYNONYMS
 from golem.errors import ConfigError
-from golem.evaluation.speed.bench import Figure, figure, print_figures, timed
+from golem.evaluation.speed.bench import BenchOutput, Figure, figure, print_figures, timed
 from golem.robots.sensors.cameras import HEAD
 from golem.types import Array, Detection, LocalizedObject, RgbdImage
 
@@ -26,17 +25,13 @@ QUESTIONS = 2000
 
 
 @dataclass(frozen=True)
-class MemoryBenchConfig:
+class MemoryBenchConfig(BenchOutput):
     """Print figures of a memory of objects at scale."""
 
     observations: int = 100_000
     """Looks that are taken in, each written to the file."""
     objects: int = 10_000
     """Objects in the room."""
-    seed: int = 0
-    """Seed of the room."""
-    json: bool = False
-    """Print the figures as a last line of JSON."""
 
 
 class Room:
@@ -78,10 +73,8 @@ def run_memory_bench(config: MemoryBenchConfig) -> list[Figure]:
         raise ConfigError(f"--observations and --seed are at least 0, --objects at least {NEAR}.")
     with TemporaryDirectory() as folder:
         figures = _scale(config, Path(folder) / "memory.sqlite")
-    print_figures(figures, "object_map with a file", "wanted")
-    if config.json:
-        print(json.dumps([asdict(f) for f in figures]))
-    return figures
+    print_figures(figures, "object_map with a file")
+    return config.told(figures)
 
 
 def _scale(config: MemoryBenchConfig, path: Path) -> list[Figure]:
