@@ -19,6 +19,7 @@ LAYERS = (
         "native_messages",
         "finite",
         "options",
+        "output_file",
         "traces",
         "registry",
         "user_file",

@@ -21,6 +21,7 @@ from golem.dashboard.status import Timeline
 from golem.errors import ConfigError, MissingExtra, OutputError
 from golem.evaluation.episodes.oracle import Oracle
 from golem.evaluation.report.demo_page import PickRecord, balance_figures, balance_section, demo_page
+from golem.output_file import write_file
 from golem.provenance import command_line, commit, versions
 from golem.robots.mujoco.balance import BalanceRecorder
 from golem.robots.mujoco.engine import MujocoRobot
@@ -234,7 +235,7 @@ class Demo:
             "wall_time": round(wall, 1),
             **facts,
         }
-        write(folder / "demo.json", json.dumps(figures, indent=2) + "\n")
+        write_file(folder / "demo.json", json.dumps(figures, indent=2) + "\n")
         print(f"{'Done' if success else 'Failed'}: {lead}")
         for film in films:
             print(f"Film:   {film}")
@@ -255,7 +256,7 @@ class Demo:
         try:
             parts = balance_section(self.recorder.trace(), self._pushed_at, balance) if balance else []
             names = [film.name for film in films]
-            write(report, demo_page(lead, self.picks, self.picture, names, poster, facts, parts))
+            write_file(report, demo_page(lead, self.picks, self.picture, names, poster, facts, parts))
         except MissingExtra as missing:
             print(f"No report was written: {missing}", flush=True)
             return None
@@ -372,13 +373,3 @@ def prepare(folder: Path) -> None:
         raise OutputError(f"Cannot write to --out {folder}: {error.strerror}; choose another.") from error
     if not os.access(folder, os.W_OK):
         raise OutputError(f"Cannot write to --out {folder}: Permission denied; choose another.")
-
-
-def write(path: Path, text: str) -> None:
-    """Write a file whole or not at all."""
-    part = path.with_name(path.name + ".part")
-    try:
-        part.write_text(text, encoding="utf-8")
-        os.replace(part, path)
-    except OSError as error:
-        raise OutputError(f"Cannot write {path}: {error.strerror}.") from error

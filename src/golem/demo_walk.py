@@ -10,8 +10,9 @@ from pathlib import Path
 
 from golem.dashboard.film import Film
 from golem.dashboard.live import LiveView
-from golem.demo import DemoConfig, prepare, write
+from golem.demo import DemoConfig, prepare
 from golem.evaluation.episodes.contacts import ContactWatch
+from golem.output_file import write_file
 from golem.robots.mujoco.balance import BalanceRecorder
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.run import Narrator, on_air, shown
@@ -81,7 +82,7 @@ def run_walk_demo(config: DemoConfig) -> bool:
         for path in films:
             print(f"Film:   {path}")
     facts = {"stack": name, "profile": config.profile, "seed": seed}
-    write(config.out / "walk.json", json.dumps(facts | figures, indent=2) + "\n")
+    write_file(config.out / "walk.json", json.dumps(facts | figures, indent=2) + "\n")
     return bool(figures["success"])
 
 

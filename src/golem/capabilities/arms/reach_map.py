@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from golem.errors import ConfigError
+from golem.output_file import write_file
 from golem.types import Array, Side
 
 FORMAT = "golem-reach-1"
@@ -72,7 +73,7 @@ def save_map(reach: ReachMap, file: Path) -> None:
     """Write the JSON file: margins in mrad, shifts in mm, -1 where a point is not served.
 
     Raises:
-        ConfigError: the file cannot be written.
+        OutputError: the file cannot be written.
     """
     margin = np.where(reach.served(), np.floor(1e3 * reach.margin), -1).astype(int)
     shift = np.where(reach.served(), np.rint(1e3 * reach.com_shift), -1).astype(int)
@@ -85,10 +86,7 @@ def save_map(reach: ReachMap, file: Path) -> None:
         "margin_mrad": margin.ravel().tolist(),
         "com_shift_mm": shift.ravel().tolist(),
     }
-    try:
-        file.write_text(json.dumps(data, separators=(",", ":")) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise ConfigError(f"Cannot write '{file}': {error.strerror}.") from error
+    write_file(file, json.dumps(data, separators=(",", ":")) + "\n")
 
 
 @functools.cache

@@ -17,9 +17,10 @@ from rich.table import Table
 from rich.text import Text
 
 from golem import registry
-from golem.errors import GolemError, OutputError
+from golem.errors import GolemError
 from golem.evaluation.conformance.base import FAILED, PASSED, Check, Finding, Report
 from golem.evaluation.conformance.examine import SUITES, UNCHECKED, candidate, examine, suite_of
+from golem.output_file import write_file
 
 _MARKS = {PASSED: ("✓", "green"), FAILED: ("✗", "red")}
 
@@ -72,10 +73,7 @@ def _keep(reports: list[Report], config: CheckConfig) -> None:
     if config.json:
         print(text)
     if config.save is not None:
-        try:
-            config.save.write_text(text + "\n", encoding="utf-8")
-        except OSError as error:
-            raise OutputError(f"'{config.save}' cannot be written: {error.strerror}.") from error
+        write_file(config.save, text + "\n")
 
 
 @contextmanager

@@ -10,7 +10,7 @@ from typing import Annotated, TypeVar
 
 from tyro.conf import arg
 
-from golem.errors import MissingExtra, OutputError, unknown_name
+from golem.errors import MissingExtra, unknown_name
 from golem.evaluation.base import rung_class
 from golem.evaluation.harness.ladder import LadderConfig, LadderResult, run_ladder
 from golem.evaluation.harness.records import TrialRecord
@@ -25,6 +25,7 @@ from golem.evaluation.report.ladder_plots import failure_plot
 from golem.evaluation.report.margin_box import MarginBox, kept_traces, margin_box, margin_boxes
 from golem.evaluation.report.svg_figure import styled
 from golem.options import fill
+from golem.output_file import write_file
 from golem.provenance import command_line
 
 
@@ -211,13 +212,9 @@ def _write(table: GraspTable) -> None:
         page = render_table(table)
     except MissingExtra as missing:
         print(f"No page was written: {missing}")
-    try:
-        table.config.out.mkdir(parents=True, exist_ok=True)
-        (table.config.out / "table.md").write_text(text, encoding="utf-8")
-        if page is not None:
-            (table.config.out / "table.html").write_text(page, encoding="utf-8")
-    except OSError as error:
-        raise OutputError(f"Cannot write to --out {table.config.out}: {error.strerror}.") from error
+    write_file(table.config.out / "table.md", text)
+    if page is not None:
+        write_file(table.config.out / "table.html", page)
     print(text, end="")
     print(f"Page: {table.config.out / 'table.html'}" if page is not None else "")
 

@@ -13,7 +13,6 @@ import fcntl
 import json
 import os
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
@@ -22,6 +21,7 @@ from typing import Any
 from golem.errors import OutputError
 from golem.evaluation.base import TrialOutcome, TrialSpec, case_name
 from golem.evaluation.harness.records import Provenance, TrialRecord, artefacts, read_records, whole_lines
+from golem.output_file import write_file
 from golem.provenance import changes
 
 FACTS = "run.json"
@@ -189,24 +189,6 @@ class RunFolder:
     def write_text(self, name: str, text: str) -> Path:
         """Write a file of the folder, whole or not at all, and return its path."""
         return write_file(self.path / name, text)
-
-
-def write_file(path: Path, text: str) -> Path:
-    """Write a file and the folder it is in, whole or not at all, and return its path.
-
-    Raises:
-        golem.errors.OutputError: it cannot be written.
-    """
-    part = path.with_name(path.name + ".part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        part.write_text(text, encoding="utf-8")
-        os.replace(part, path)
-    except OSError as error:
-        with suppress(OSError):
-            part.unlink()
-        raise OutputError(f"Cannot write {path}: {error.strerror}.") from error
-    return path
 
 
 def read_facts(folder: Path) -> dict[str, Any]:

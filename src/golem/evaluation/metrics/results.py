@@ -15,9 +15,10 @@ from tyro.conf import Positional
 from golem.errors import ConfigError
 from golem.evaluation.base import RUNGS, make_rung
 from golem.evaluation.harness.records import TrialRecord, read_records
-from golem.evaluation.harness.run_folder import read_costs, read_facts, write_file
+from golem.evaluation.harness.run_folder import read_costs, read_facts
 from golem.evaluation.metrics.summary import summarise
 from golem.evaluation.metrics.tables import run_tables
+from golem.output_file import write_file
 
 HOUR = 3600.0
 CONFIDENCE = 0.95

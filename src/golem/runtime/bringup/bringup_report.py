@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from golem import __version__
-from golem.errors import ConfigError, OutputError
+from golem.errors import ConfigError
+from golem.output_file import write_file
 from golem.runtime.bringup.base import BringupStep, StepFinding
 
 FILE, PAGE = "bringup.json", "report.md"
@@ -65,7 +66,7 @@ class BringupReport:
             name: {"at": e.at, "passed": e.finding.passed, "text": e.finding.text, "figures": e.finding.figures}
             for name, e in self._entries.items()
         }
-        self._write(FILE, json.dumps({"where": self._where, "checks": rows}, indent=1) + "\n")
+        write_file(self._folder / FILE, json.dumps({"where": self._where, "checks": rows}, indent=1) + "\n")
 
     def page(self, checks: Sequence[BringupStep]) -> Path:
         """Write the report of all checks; return its path.
@@ -83,13 +84,4 @@ class BringupReport:
                 if entry.finding.figures:
                     lines += ["| what | value |", "| --- | --- |"]
                     lines += [f"| {name} | {value} |" for name, value in entry.finding.figures.items()] + [""]
-        return self._write(PAGE, "\n".join(lines))
-
-    def _write(self, name: str, text: str) -> Path:
-        path = self._folder / name
-        try:
-            self._folder.mkdir(parents=True, exist_ok=True)
-            path.write_text(text, encoding="utf-8")
-        except OSError as error:
-            raise OutputError(f"'{path}' cannot be written: {error}.") from error
-        return path
+        return write_file(self._folder / PAGE, "\n".join(lines))
