@@ -184,7 +184,7 @@ def test_a_domain_is_served_to_foxglove(robot: CycloneParticipant, domain: int) 
     color, description = writer(robot, COLOR), writer(robot, DESCRIPTION)
     model = codec.serialize(String(data="<robot/>"))
     description.write(model)
-    with golem("view", "--foxglove", "--port", "0", "--domain", str(domain)) as server:
+    with golem("view", "--port", "0", "--domain", str(domain)) as server:
         assert server.stdout is not None
         url = re.search(r"ws://\S+", server.stdout.readline())
         assert url is not None

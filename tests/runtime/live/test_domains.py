@@ -131,7 +131,7 @@ def test_who_else_is_there_is_said_with_what_to_look_at(here: DdsConfig) -> None
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("words", [["record", "BAG", "--topics", "/lowcmd"], ["view", "--foxglove", "--port", "0"]])
+@pytest.mark.parametrize("words", [["record", "BAG", "--topics", "/lowcmd"], ["view", "--port", "0"]])
 def test_who_reads_for_golem_is_known_by_name_recorders_and_viewers_too(
     words: list[str], here: DdsConfig, tmp_path: Path
 ) -> None:

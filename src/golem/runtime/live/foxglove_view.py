@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from tyro.conf import OmitArgPrefixes
 
-from golem.errors import ConfigError, unknown_name
+from golem.errors import unknown_name
 from golem.interfaces import public
 from golem.interfaces.recorded import public_topics
 from golem.middleware.bags.base import BagTopic
@@ -27,10 +27,8 @@ PERIOD = 0.02
 
 @dataclass(frozen=True)
 class ViewConfig:
-    """Show a domain live."""
+    """Serve a domain to Foxglove; open the address that is printed there."""
 
-    foxglove: bool = False
-    """Serve Foxglove's protocol; open the address that is printed in Foxglove."""
     topics: tuple[str, ...] = ()
     """Public topics to offer, by their ROS names; default: all, images as they are."""
     host: str = "127.0.0.1"
@@ -47,11 +45,6 @@ def run_view(config: ViewConfig) -> None:
         ConfigError: an option is wrong, or the port is taken.
         DdsError: the domain cannot be joined.
     """
-    if not config.foxglove:
-        raise ConfigError(
-            "golem view serves a domain to Foxglove: add --foxglove. The view of a stack in one process is: "
-            "golem run STACK --view."
-        )
     topics = public_topics(config.topics)
     for name in config.topics:
         if name not in {topic.name for topic in topics}:
