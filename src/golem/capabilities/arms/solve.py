@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from golem.capabilities.arms.base import NUM_UPPER, TargetError
+from golem.capabilities.arms.base import TargetError
 from golem.capabilities.arms.diff_ik import DiffIK
 from golem.capabilities.arms.task_space import TaskSpaceConfig
 from golem.types import NUM_JOINTS, SIDES, UPPER, Array, Side
@@ -18,14 +18,6 @@ _OFFLINE = TaskSpaceConfig(
     error_damping=1e-2, limit_margin=0.05, collision_rows=0,
 )  # fmt: skip
 _ITERATIONS = 120
-
-
-def random_starts(n: int, rng: np.random.Generator) -> Array:
-    """Return (n, 15) postures drawn evenly between the position limits, with the torso ahead."""
-    ik = DiffIK(_OFFLINE)
-    starts = rng.uniform(ik.lower, ik.upper, size=(n, NUM_UPPER))
-    starts[:, 0] = 0.0
-    return starts
 
 
 def solve_posture(
