@@ -72,26 +72,23 @@ NOTHING: Array = np.zeros((0, 4))
 """No spheres."""
 
 
-def cloud_grid(
-    points: Points, cell: float = 0.02, bounds: Array = REACH, spheres: Array = NOTHING, margin: float = 0.0
-) -> CloudGrid:
+def cloud_grid(points: Points, cell: float = 0.02, spheres: Array = NOTHING, margin: float = 0.0) -> CloudGrid:
     """Return the grid of a cloud; 10 million points take about half a second.
 
     Args:
-        points: (n, 3) in the base frame [m]; those that are not finite are dropped.
+        points: (n, 3) in the base frame [m]; those that are not finite, or not within `REACH`, are dropped.
         cell: size of a cell [m].
-        bounds: (2, 3) opposite corners; points outside are dropped.
         spheres: (m, 4) see `cleared`.
         margin: see `cleared` [m].
 
     Raises:
-        ConfigError: `points` has another shape, or the grid no volume.
+        ConfigError: `points` has another shape, or cells no size.
     """
     if np.ndim(points) != 2 or np.shape(points)[1] != 3:
         raise ConfigError(f"A cloud is an (n, 3) array of points, not {np.shape(points)}.")
-    low, high = np.asarray(bounds, float)
-    if not cell > 0.0 or not (high - low > 0.0).all():
-        raise ConfigError("The grid of a cloud needs a positive cell and bounds with a volume.")
+    low, high = REACH
+    if not cell > 0.0:
+        raise ConfigError(f"The cells of a cloud's grid have a positive size, not {cell:g} m.")
     shape = np.ceil((high - low) / cell).astype(np.int64)
     frame = np.append(low, cell)
     if not points.flags.c_contiguous:

@@ -93,14 +93,14 @@ class MovingHand:
 class ScriptedPerson:
     """A person who does at once, and without a mistake, what is asked."""
 
-    def __init__(self, dds: DdsConfig, fault: str, tell: Callable[[str], None] = log_line) -> None:
+    def __init__(self, dds: DdsConfig, fault: str) -> None:
         """Stand beside the twin on the domain that has `fault`."""
-        self._dds, self._fault, self._say = dds, fault, tell
+        self._dds, self._fault = dds, fault
         self._hand: MovingHand | None = None
 
     def tell(self, text: str) -> None:
         """Hear something."""
-        self._say(text)
+        log_line(text)
 
     def confirm(self, question: str, word: str) -> bool:
         """Say the word."""

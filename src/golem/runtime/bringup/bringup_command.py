@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -247,14 +247,10 @@ def run_bringup(config: BringupConfig, person: BringupPerson | None = None) -> b
 
 
 def run_checks(
-    bench: Workbench,
-    report: BringupReport,
-    checks: tuple[BringupStep, ...],
-    again: Collection[str],
-    tell: Callable[[str], None] | None = None,
+    bench: Workbench, report: BringupReport, checks: tuple[BringupStep, ...], again: Collection[str]
 ) -> bool:
     """Do the checks in order, those left out that last and have passed; return whether none failed."""
-    tell = tell or bench.person.tell
+    tell = bench.person.tell
     for number, check in enumerate(checks, 1):
         head = f"{number}/{len(checks)} {check.title}"
         if check.lasting and report.passed(check.name) and check.name not in again:
