@@ -57,15 +57,6 @@ def _run(words: list[str]) -> int:
     return 0 if result.success else BAD_INPUT if result.stage == REFUSED else FAILED
 
 
-def _options(words: list[str]) -> int:
-    """List what a stack file may set: slots, their implementations, the options of one."""
-    _prepare_graphics()
-    from golem.option_list import OptionsConfig, options_text
-
-    print(options_text(_parse(OptionsConfig, "options", words)))
-    return 0
-
-
 def _ladder(words: list[str]) -> int:
     """Compare methods on one rung of the capability ladder, on the same seeds."""
     from golem.evaluation.rung_table import refuse_early
@@ -251,7 +242,8 @@ def _command(doc: str, module: str, names: str, graphics: bool = False) -> Calla
 COMMANDS: dict[str, Callable[[list[str]], int]] = {
     "demo": _demo,
     "run": _run,
-    "options": _options,
+    "options": _command("List what a stack file may set: slots, their implementations, the options of one.",
+                        "golem.option_list", "OptionsConfig:run_options", True),
     "ladder": _ladder,
     "faults": _faults,
     "compare": _command("Compare two ladder runs on the same seeds, e.g. tether with stand.",

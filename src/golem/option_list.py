@@ -54,6 +54,11 @@ class Option:
     text: str
 
 
+def run_options(config: OptionsConfig) -> None:
+    """Print what `options_text` returns."""
+    print(options_text(config))
+
+
 def options_text(config: OptionsConfig) -> str:
     """Return the list.
 
