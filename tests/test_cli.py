@@ -29,7 +29,7 @@ BROKEN = {
     "use": (["ladder", "--use", "upper_body"], "slot=implementation"),
     "stack": (["run", "nowhere"], "hall, stand, tether"),
     "run seed": (["run", "--seed", "-1"], "The seed is -1; it must be 0 or more"),
-    "bench": (["bench", "plan"], "Unknown bench 'plan'; valid: arms, dds, grasp,"),
+    "bench": (["bench", "plan"], "Unknown bench 'plan'; valid: arms, grasp,"),
     "number": (["ladder", "-n", "ten"], "-n is a whole number, not 'ten'."),
     "option of a method": (
         ["ladder", "--method", "{use: visual_servo, gian: 3}"],

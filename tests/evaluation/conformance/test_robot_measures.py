@@ -25,7 +25,7 @@ from golem.types import TICK, Array, HandState, Imu, LowState, Side
 Change = Callable[[LowState], LowState]
 
 
-class ObedientRig:
+class ObedientRig(RobotRig):
     """A robot that is where it is sent; `change` spoils what it reports, `scale` its depth, `tilt` its LiDAR."""
 
     def __init__(self) -> None:
@@ -40,14 +40,14 @@ class ObedientRig:
         for i in range(round(seconds / TICK) + 1):
             before = self.q
             self.q = path(max(0.0, i * TICK - self.slow))
-            states.append(self._state(i * TICK, (self.q - before) / TICK))
+            states.append(self._reported(i * TICK, (self.q - before) / TICK))
         return states
 
     def rest(self, seconds: float) -> list[LowState]:
         q = self.q.copy()
         return self.follow(lambda t: q, seconds)
 
-    def _state(self, t: float, dq: Array) -> LowState:
+    def _reported(self, t: float, dq: Array) -> LowState:
         yaw = self.q[TORSO]
         quat = np.array([np.cos(yaw / 2.0), 0.0, 0.0, np.sin(yaw / 2.0)])
         imu = Imu(quat, np.array([0.0, 0.0, dq[TORSO]]), np.array([0.0, 0.0, 9.81]))

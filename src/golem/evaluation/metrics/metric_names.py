@@ -44,7 +44,9 @@ SCALES = {"deg": math.degrees(1.0), "%": 100.0}
 def _metrics() -> dict[str, Metric]:
     text = (files(__package__ or "") / "metrics.yaml").read_text(encoding="utf-8")
     rows: dict[str, dict[str, Any]] = yaml.load(text, getattr(yaml, "CSafeLoader", yaml.SafeLoader))
-    return {name: Metric(**({"scale": SCALES.get(row.get("unit", ""), 1.0)} | row)) for name, row in rows.items()}
+    for row in rows.values():
+        row.setdefault("scale", SCALES.get(row.get("unit", ""), 1.0))
+    return {name: Metric(**row) for name, row in rows.items()}
 
 
 METRICS: dict[str, Metric] = _metrics()
