@@ -19,7 +19,7 @@ import yaml
 from golem.capabilities.identification import regressor as r
 from golem.capabilities.identification.fit import Identified, identify
 from golem.capabilities.identification.outcome import save, tracking_error
-from golem.capabilities.identification.recording import Motion, read_motion
+from golem.capabilities.identification.recording import RecordedMotion, read_motion
 from golem.robots.model.table import JOINT_NAMES
 from golem.runtime.identify_command import KEPT, record_motion
 from golem.stack import load_stack
@@ -60,8 +60,8 @@ def judge(seed: int, folder: Path) -> dict[str, object]:
     motion = read_motion(folder / "bag")
     kept = int(KEPT * len(motion.q))
     weight = r.BARE + float(r.MASSES @ hidden.x[:30])
-    found, weighed = (identify(Motion(*(rows[:kept] for rows in motion)), w) for w in (None, weight))
-    rest = Motion(*(rows[kept:] for rows in motion))
+    found, weighed = (identify(RecordedMotion(*(rows[:kept] for rows in motion)), w) for w in (None, weight))
+    rest = RecordedMotion(*(rows[kept:] for rows in motion))
     before, after = (tracking_error(x, t, rest) for x, t in ((r.NOMINAL, 0.0), (found.x, found.delay)))
     save(found, folder / "found", "")
     off, mass = found.x - hidden.x, r.MASSES[:28]

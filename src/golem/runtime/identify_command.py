@@ -10,7 +10,7 @@ from tyro.conf import Positional
 
 from golem.capabilities.identification.fit import identify
 from golem.capabilities.identification.outcome import BODY, PROFILE, REPORT, save, tracking_error
-from golem.capabilities.identification.recording import COMMAND, STATE, Motion, read_motion
+from golem.capabilities.identification.recording import COMMAND, STATE, RecordedMotion, read_motion
 from golem.capabilities.identification.regressor import NOMINAL, PAYLOAD
 from golem.errors import ConfigError
 from golem.interfaces.recorded import public_topics
@@ -83,8 +83,8 @@ def run_identify(config: IdentifyConfig) -> None:
         return
     motion = read_motion(config.bag)
     kept = int(KEPT * len(motion.q))
-    found = identify(Motion(*(rows[:kept] for rows in motion)), config.weight)
-    rest = Motion(*(rows[kept:] for rows in motion))
+    found = identify(RecordedMotion(*(rows[:kept] for rows in motion)), config.weight)
+    rest = RecordedMotion(*(rows[kept:] for rows in motion))
     before, after = (tracking_error(x, t, rest) * 1e3 for x, t in ((NOMINAL, 0.0), (found.x, found.delay)))
     said = (
         f"Joints of the last {100 * (1 - KEPT):.0f} % of the motion, which played no part: missed by {before:.1f} mrad "

@@ -8,7 +8,7 @@ import pytest
 from golem.capabilities.identification import regressor as r
 from golem.capabilities.identification.fit import find_delay, identify
 from golem.capabilities.identification.outcome import simulate
-from golem.capabilities.identification.recording import IdentificationError, Motion
+from golem.capabilities.identification.recording import IdentificationError, RecordedMotion
 from golem.capabilities.identification.sweep import MIDDLE, swing
 from golem.hardware.servo.gains import default_gains
 from golem.robots.model.imu_mount import TORSO
@@ -16,17 +16,17 @@ from golem.robots.model.limits import load_limits
 from golem.types import TICK, Array
 
 
-def commanded(seconds: float) -> Motion:
+def commanded(seconds: float) -> RecordedMotion:
     """Return the commands of a sweep, and the readings of a pelvis at rest."""
     n, gains = int(seconds / TICK), default_gains()
     rows = np.zeros((n, 5, 27))
     rows[:, 0] = [swing(k * TICK, MIDDLE) for k in range(n)]
     rows[:, 3], rows[:, 4] = gains.kp, gains.kd
     still = np.zeros((n, 3))
-    return Motion(rows[:, 0], 0.0 * rows[:, 0], 0.0 * rows[:, 0], still, still + [0.0, 0.0, 9.81], rows)
+    return RecordedMotion(rows[:, 0], 0.0 * rows[:, 0], 0.0 * rows[:, 0], still, still + [0.0, 0.0, 9.81], rows)
 
 
-def on_the_torso(motion: Motion) -> Motion:
+def on_the_torso(motion: RecordedMotion) -> RecordedMotion:
     """Return `motion` with what the torso's IMU reads while the pelvis rests."""
     gyro, acc = np.zeros((2, len(motion.q), 3))
     gyro[:, 2] = motion.dq[:, TORSO]

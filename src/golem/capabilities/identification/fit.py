@@ -14,7 +14,7 @@ from scipy.ndimage import maximum_filter1d
 from scipy.signal import butter, sosfiltfilt
 
 from golem.capabilities.identification import regressor as r
-from golem.capabilities.identification.recording import IdentificationError, Motion
+from golem.capabilities.identification.recording import IdentificationError, RecordedMotion
 from golem.capabilities.identification.regressor import HangingTree
 from golem.robots.model.limits import load_limits
 from golem.robots.model.table import JOINT_NAMES
@@ -59,14 +59,14 @@ def low_passed(values: Array) -> Array:
     return sosfiltfilt(_LOW, values, axis=0)
 
 
-def torque(motion: Motion, delay: int) -> Array:
+def torque(motion: RecordedMotion, delay: int) -> Array:
     """Return the (n, 27) torques [N m] that PD drives give, within their limits, to commands `delay` ticks old."""
     q, dq, tau, kp, kd = np.moveaxis(motion.command[np.maximum(np.arange(len(motion.q)) - delay, 0)], 1, 0)
     limit = load_limits().torque
     return np.clip(kp * (q - motion.q) + kd * (dq - motion.dq) + tau, -limit, limit)
 
 
-def find_delay(motion: Motion) -> tuple[int, Array]:
+def find_delay(motion: RecordedMotion) -> tuple[int, Array]:
     """Find by the torques that drives report, those that they give times a gain some ticks later, delay and gain (27,).
 
     Raises:
@@ -91,7 +91,7 @@ def find_delay(motion: Motion) -> tuple[int, Array]:
     return int(best[0]), gains[best]
 
 
-def identify(motion: Motion, weight: float | None = None) -> Identified:
+def identify(motion: RecordedMotion, weight: float | None = None) -> Identified:
     """Identify the robot that moved.
 
     Args:

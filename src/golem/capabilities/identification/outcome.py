@@ -11,7 +11,7 @@ import yaml
 
 from golem.capabilities.identification import regressor as r
 from golem.capabilities.identification.fit import Identified, low_passed
-from golem.capabilities.identification.recording import Motion
+from golem.capabilities.identification.recording import RecordedMotion
 from golem.errors import OutputError
 from golem.robots.model import mjcf
 from golem.robots.model.imu_mount import TORSO
@@ -44,7 +44,7 @@ def body_spec(x: Array, loaded: bool = False) -> mujoco.MjSpec:
     return spec
 
 
-def simulate(x: Array, delay: float, motion: Motion) -> Motion:
+def simulate(x: Array, delay: float, motion: RecordedMotion) -> RecordedMotion:
     """Return what a robot with parameters `x` (143,) reports under the commands of `motion`, `delay` [s] old.
 
     It begins as `motion` does. The pelvis stays where it is; gravity is what the IMU measured.
@@ -73,7 +73,7 @@ def simulate(x: Array, delay: float, motion: Motion) -> Motion:
     return motion._replace(q=out[:, 0], dq=out[:, 1], tau=out[:, 2])
 
 
-def tracking_error(x: Array, delay: float, motion: Motion) -> float:
+def tracking_error(x: Array, delay: float, motion: RecordedMotion) -> float:
     """Return by how much a robot, as for `simulate`, misses the joints of `motion`, root mean square [rad]."""
     return float(np.sqrt(np.mean((simulate(x, delay, motion).q - motion.q) ** 2)))
 

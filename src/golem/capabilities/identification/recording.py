@@ -23,7 +23,7 @@ class IdentificationError(GolemError):
     """A bag does not tell what a robot is like."""
 
 
-class Motion(NamedTuple):
+class RecordedMotion(NamedTuple):
     """One stretch of motion under command, a row per tick.
 
     q, dq, tau (n, 27) as the motors report them [rad], [rad/s], [N m]; gyro, acc (n, 3) as the torso IMU reports them
@@ -38,7 +38,7 @@ class Motion(NamedTuple):
     command: Array
 
 
-def read_motion(path: Path) -> Motion:
+def read_motion(path: Path) -> RecordedMotion:
     """Read the longest stretch in which all motors were stiff and commands came.
 
     Args:
@@ -79,4 +79,4 @@ def read_motion(path: Path) -> Motion:
         )
     state = np.column_stack([np.interp(t[first:last], seen, column) for column in states[:, 1:].T])
     q, dq, tau, gyro, acc = np.split(state, [n, 2 * n, 3 * n, 3 * n + 3], axis=1)
-    return Motion(q, dq, tau, gyro, acc, commands[newest[first:last], 1:].reshape(-1, 5, n))
+    return RecordedMotion(q, dq, tau, gyro, acc, commands[newest[first:last], 1:].reshape(-1, 5, n))
