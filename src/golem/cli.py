@@ -265,7 +265,7 @@ COMMANDS: dict[str, Callable[[list[str]], int]] = {
     "calibrate": _command("Calibrate cameras and the arms' encoders by tags on the hands.",
                           "golem.runtime.calibrate_command", "CalibrateConfig:run_calibrate", True),
     "identify": _command("Find a robot's masses, friction, delay and encoder zeros from a bag of its motion.",
-                         "golem.runtime.identify_command", "IdentifyConfig:run_identify"),
+                         "golem.evaluation.identification.identify_command", "IdentifyConfig:run_identify"),
     "drivers": _drivers,
     "up": _command("Run the modules of a stack file for the robot on a domain.",
                    "golem.runtime.live.process", "UpConfig:run_up"),

@@ -46,6 +46,7 @@ def test_is_an_upper_body(ik: DiffIK) -> None:
     assert isinstance(ik, UpperBody)
 
 
+@pytest.mark.slow
 def test_two_circles_are_tracked(ik: DiffIK) -> None:
     left, right = hands(ik)
     errors = []

@@ -68,6 +68,7 @@ def test_mount_and_zeros_are_found_within_what_the_covariance_says(seed: int) ->
     assert found.residual == pytest.approx(PIXEL, rel=0.25)
 
 
+@pytest.mark.slow
 def test_a_tag_that_is_half_hidden_is_left_out() -> None:
     seen_well = views(10, np.eye(4), np.zeros(NUM_JOINTS), 1)
     spoilt = [
@@ -78,6 +79,7 @@ def test_a_tag_that_is_half_hidden_is_left_out() -> None:
     assert found.views == len(seen_well) - 1 and found.residual < 1.5 * PIXEL
 
 
+@pytest.mark.slow
 def test_one_hand_does_not_do() -> None:
     of_left = [v for v in views(8, np.eye(4), np.zeros(NUM_JOINTS), 0) if v.side == "left"]
     with pytest.raises(ConfigError, match="right hand's tags were seen in 0 postures"):

@@ -47,6 +47,7 @@ def off(estimate: OdometryEstimate | None, walk: MadeWalk = WALK) -> float:
     return float(estimate.T_odom_base[0, 3]) - walk.way(estimate.t)
 
 
+@pytest.mark.slow
 def test_it_follows_within_two_centimetres_and_starts_level() -> None:
     odometry = Lio()
     assert isinstance(odometry, LidarOdometry)

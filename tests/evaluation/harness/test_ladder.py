@@ -255,6 +255,7 @@ def test_the_summary_line_says_what_a_script_needs(fake: Make) -> None:
     assert json.loads((result.out / "summary.json").read_text()) == json.loads(line)
 
 
+@pytest.mark.slow
 def test_an_adaptive_rung_goes_where_the_results_lead(fake: Make) -> None:
     one, two = fake(rung="climb", n=3, out="one"), fake(rung="climb", n=3, out="two", j=2)
     result = run_ladder(one)

@@ -28,10 +28,10 @@ def test_each_name_lifts_its_own_limits() -> None:
     assert changed("speed") == {"velocity"}
     assert changed("range") == {"state_lower", "state_upper"}
     assert changed("effort+slew") == {"torque_command", "slew"}
-    assert changed("balance") == {"capture", "sinking", "lean"}
+    assert changed("balance") == {"capture", "sinking", "lean", "low"}
     assert changed("stops") == {
         "velocity", "state_lower", "state_upper", "torque_samples", "tilt", "sane", "jolts", "throw",
-        "capture", "sinking", "lean", "hung", "least_kp", "least_kd",
+        "capture", "sinking", "lean", "low", "hung", "least_kp", "least_kd",
     }  # fmt: skip
     assert changed("bounds") == {
         "lower", "upper", "slew", "torque_command", "kp_max", "kd_max", "kp_rate", "kd_rate"

@@ -71,6 +71,7 @@ def test_a_robot_whose_legs_carry_nothing_does_not_pick_in_its_band() -> None:
     assert (outcome.success, outcome.stage, outcome.module) == (False, "settle", f"lower_body: {LIMP}")
 
 
+@pytest.mark.slow
 def test_a_trial_depends_on_its_spec_alone(rung: TetherRung) -> None:
     first = rung.run(spec(profile="field"), None)
     rung.run(spec(profile="field", index=1), None)
@@ -174,6 +175,7 @@ def test_what_the_rung_brings_is_not_replaced(slot: str, use: str) -> None:
         StandRung().config("visual_servo", "field", {slot: use})
 
 
+@pytest.mark.slow
 def test_a_robot_that_falls_after_its_errand_has_lost_it(monkeypatch: pytest.MonkeyPatch) -> None:
     loss = Loss("fall", "The robot fell at 9.0 s.")
     monkeypatch.setattr(pick, "lost", lambda running, recorder: loss)

@@ -185,5 +185,5 @@ def test_a_message_that_is_no_value_is_refused_by_name(row: TopicRow) -> None:
 def test_every_row_of_a_stream_can_be_sent() -> None:
     """Or its process says how: it is the few whose message takes more than the value."""
     special = {row.name for row in public.TOPICS if row.key is not None and row.encode is None}
-    assert special == {"/lowcmd", "/joint_states", "/tf", "/odom", "/safety/lowcmd_in"}
+    assert special == {"/lowcmd", "/joint_states", "/tf", "/odom", "/safety/lowcmd_in", "/wrench/left", "/wrench/right"}
     assert all(row.rate for row in public.TOPICS if row.thinned)

@@ -9,10 +9,10 @@ from pathlib import Path
 from tyro.conf import Positional
 
 from golem.capabilities.identification.fit import identify
-from golem.capabilities.identification.outcome import BODY, PROFILE, REPORT, save, tracking_error
 from golem.capabilities.identification.recording import COMMAND, STATE, RecordedMotion, read_motion
 from golem.capabilities.identification.regressor import NOMINAL, PAYLOAD
 from golem.errors import ConfigError
+from golem.evaluation.identification.outcome import BODY, PROFILE, REPORT, save, tracking_error
 from golem.interfaces.recorded import public_topics
 from golem.middleware.bags.writer import BagWriter
 from golem.runtime.live.broadcast import Broadcast

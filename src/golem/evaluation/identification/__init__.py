@@ -1,0 +1,1 @@
+"""What an identified robot is written as, and the command that identifies one."""
