@@ -112,6 +112,17 @@ def test_legs_that_answered_and_then_say_the_same_for_ever_are_found(walking: An
     assert result.reason is Reason.COMMAND_HUNG and 45 <= k <= 60
 
 
+@pytest.mark.parametrize("answers", [True, False])
+def test_legs_that_torques_carry_answer_by_these(answers: bool, walking: Any) -> None:
+    """A whole-body controller holds a target without stiffness and answers by feed-forward torques."""
+
+    def held(k: int) -> dict[str, Any]:
+        return living(walking, 60, kp=np.zeros(27), tau=np.full(27, 8.0 + 0.01 * (answers * k // 10)))
+
+    k, result = stopped(walking, held, 200)
+    assert (k, result.reason) == (200, None) if answers else result.reason is Reason.COMMAND_HUNG and 45 <= k <= 60
+
+
 def test_a_robot_that_hangs_may_hold_its_targets(walking: Any) -> None:
     walking.tau = np.zeros(27)
     assert stopped(walking, lambda k: living(walking, k // 10), 100)[0] == 100

@@ -17,6 +17,7 @@ from golem.hardware.safety.base import Counters, Outgoing, SafetyLimits
 from golem.hardware.safety.gate_balance import BALANCE, balances, carried, sense_balance, unbalanced
 from golem.hardware.safety.kernel import ORDINARY as SOUND
 from golem.hardware.safety.kernel import UNKNOWN, limited, ordinary_command, rate_state
+from golem.hardware.safety.limit_table import LEAST_KP
 from golem.hardware.safety.memory import GateMemory
 from golem.hardware.safety.sender import LIVELY, SenderMemory
 from golem.hardware.safety.senses import CALM, EVERY, FORGET, GRAVITY_TIME, LOOK, LOST, STEADY, SensesMemory
@@ -151,7 +152,9 @@ def pass_command(r: Record, m: Record) -> bool:
     moved, moves = m.moved, m.moves
     same = True
     for i in range(_LEGS):
-        same = same and r.request[i] == m.command[i]
+        kp, tau = 3 * _N + i, 2 * _N + i
+        same = same and r.request[i] == m.command[i] and r.request[kp] == m.command[kp]
+        same = same and (r.request[kp] >= m.table[LEAST_KP, i] or r.request[tau] == m.command[tau])
     if not same:
         moves = min(moves + 1, LIVELY) if r.request_t - moved <= 0.5 * m.hung else 0
         moved = r.request_t

@@ -127,10 +127,17 @@ def ungrasped(new: LowCommand, limits: SafetyLimits) -> tuple[NDArray[np.bool_],
 
 def _answers(new: LowCommand, m: SenderMemory, limits: SafetyLimits) -> tuple[float, int, bool]:
     """Return the next `moved` and `moves`, and whether the legs' targets hang; sensors that stand still excuse it."""
-    if m.last is None or np.count_nonzero(new.q[LEGS] != m.last.q[LEGS]):
+    if m.last is None or _differs(new, m.last, limits):
         lively = new.t - m.moved <= 0.5 * limits.hung
         return new.t, min(m.moves + 1, LIVELY) if lively else 0, False
     return m.moved, m.moves, limits.frozen > 0.0 and m.moves == LIVELY and new.t - m.moved > limits.hung
+
+
+def _differs(new: LowCommand, last: LowCommand, limits: SafetyLimits) -> bool:
+    """Return whether legs are told another thing: a target, a stiffness, or, where that is small, a torque."""
+    soft = new.kp[LEGS] < limits.least_kp[LEGS]
+    told = (new.q, last.q), (new.kp, last.kp)
+    return any((a[LEGS] != b[LEGS]).any() for a, b in told) or bool((soft & (new.tau[LEGS] != last.tau[LEGS])).any())
 
 
 def _ordinary(new: LowCommand, last: LowCommand, limits: SafetyLimits) -> bool:
