@@ -6,7 +6,7 @@ from pathlib import Path
 
 from tests.sources import SOURCE
 
-ALL = 100_807
+ALL = 100_809
 """Lines of the package [own: 92,000 is the goal; lower this with every line that goes]."""
 ON_A_ROBOT = 63_920
 """Lines of what a robot runs [own: 62,000 is the goal]."""

@@ -11,7 +11,7 @@ from golem.capabilities.grasping.centroid import grasp_pose
 from golem.robots.worlds.tableware import KINDS
 from golem.training.grasps import grasp_labels
 from golem.training.grasps.grasp_labels import GraspTrial
-from golem.training.grasps.ware_scene import WARE, WareDraw, build_world
+from golem.training.grasps.ware_scene import WARE, WRIST, WareDraw, build_world
 
 DOWN = np.array([0.0, 0.0, -1.0])
 
@@ -27,6 +27,11 @@ def test_a_can_is_held_by_its_middle_and_not_beside_it() -> None:
     above[2, 3] = 0.14
     assert not trial.held(above, 0.09)
     assert trial.held(middle, 0.09)  # what was tried before changes nothing
+
+
+def test_the_wrist_weighs_where_it_is() -> None:
+    model = build_world(WareDraw("can", 1.0, 0.0, DOWN))
+    np.testing.assert_array_equal(model.body(WRIST).ipos, 0.0)
 
 
 def test_wares_keep_their_shape_in_every_size() -> None:

@@ -65,8 +65,9 @@ def build_world(draw: WareDraw) -> mujoco.MjModel:
     add_object(spec, draw.kind, WARE, (0.0, 0.0, 0.0), draw.yaw, COLOURS[draw.kind][0], size=draw.size)
     spec.worldbody.add_body(name=LEADER, mocap=True)
     wrist = spec.worldbody.add_body(
-        name=WRIST, mass=WRIST_MASS, inertia=[WRIST_INERTIA] * 3, explicitinertial=True, pos=[0.0, 0.0, 1.0]
-    )
+        name=WRIST, mass=WRIST_MASS, inertia=[WRIST_INERTIA] * 3, explicitinertial=True, pos=[0.0, 0.0, 1.0],
+        ipos=[0.0, 0.0, 0.0],
+    )  # fmt: skip
     wrist.add_freejoint(name=WRIST)
     add_hand(spec, SIDE)
     for body in [wrist, *wrist.find_all(mujoco.mjtObj.mjOBJ_BODY)]:
