@@ -37,6 +37,8 @@ ANGLE = 0.2
 """How far a joint is moved by hand [rad]."""
 PACE = 0.4
 """How fast [rad/s]."""
+NEAR = 0.05
+"""Distance from where a joint was at which it is back [rad]."""
 
 
 class MovingHand:
@@ -46,7 +48,7 @@ class MovingHand:
         """Take hold of the twin on the domain, which reports with `fault`."""
         self._dds, self._fault = dds, fault
         self._goal: tuple[int, float] | None = None
-        self._over = threading.Event()
+        self._over, self._there = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._run, name="hand", daemon=True)
         self._thread.start()
 
@@ -55,8 +57,10 @@ class MovingHand:
         self._goal = (joint, by)
 
     def back(self) -> None:
-        """Put everything back."""
+        """Put everything back, and wait until it is there, or for 10 s."""
         self._goal = None
+        self._there.clear()
+        self._there.wait(10.0)
 
     def close(self) -> None:
         """Let go for good."""
@@ -75,14 +79,16 @@ class MovingHand:
                 state = _newest(reader.take)
                 if state is None:
                     continue
+                q = reported(self._fault, state.q)
                 if hold is None or at is None:
                     # Inside the range, so that nothing leans on its end.
-                    q = reported(self._fault, state.q)
                     hold = np.clip(q, [j.lower + 0.02 for j in JOINTS], [j.upper - 0.02 for j in JOINTS])
                     at, t = hold.copy(), state.t
                 wanted = hold.copy()
                 if self._goal is not None:
                     wanted[self._goal[0]] += self._goal[1]
+                elif np.abs(q - hold).max() < NEAR:
+                    self._there.set()
                 step = PACE * max(0.0, state.t - t)
                 at, t = at + np.clip(wanted - at, -step, step), state.t
                 zero = np.zeros_like(at)
