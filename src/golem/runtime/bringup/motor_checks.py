@@ -18,10 +18,12 @@ RISE = 3.0
 """Time in which the gains rise [s]."""
 SWING = 0.1
 """How far each joint is sent and back in the first motion [rad]."""
+SWINGS = 3
+"""How often one that does not answer is sent again, each time `SWING` farther: low gains meet dry friction."""
 PULSE = 0.5
 """How long it is sent there [s]."""
 ANSWERS = 0.3
-"""Share of it that the joint has to move; a quarter of the gains does not overcome all friction."""
+"""Share of `SWING` that the joint has to move."""
 DRIFT = 0.35
 """How far any joint may move while the gains rise [rad]."""
 
@@ -100,10 +102,10 @@ class LowGainMotion:
         """The stiffness and damping to command now, (27,) each."""
         return self.level * self._kp, self._kd
 
-    def send(self, joint: int) -> float:
-        """Send one joint away from where it rests, towards the middle of its range; return by how much [rad]."""
+    def send(self, joint: int, swing: float) -> float:
+        """Send one joint by `swing` [rad] from its rest towards the middle of its range; return by how much [rad]."""
         self.target = self._rest.copy()
-        by = SWING if self._rest[joint] < self._middle[joint] else -SWING
+        by = swing if self._rest[joint] < self._middle[joint] else -swing
         self.target[joint] += by
         return by
 
@@ -145,12 +147,15 @@ def check_motion(bench: Workbench) -> StepFinding:
     for joint in range(NUM_JOINTS):
         if wrong:
             break
-        before = link.states[-1][1].q.copy()
-        by = motion.send(joint)
-        link.pass_time(PULSE, send)
-        moved = link.states[-1][1].q - before
-        motion.rest()
-        link.pass_time(PULSE, send)
+        for swing in range(1, SWINGS + 1):
+            before = link.states[-1][1].q.copy()
+            by = motion.send(joint, swing * SWING)
+            link.pass_time(PULSE, send)
+            moved = link.states[-1][1].q - before
+            motion.rest()
+            link.pass_time(PULSE, send)
+            if _stopped(bench) or float(np.abs(moved).max()) >= ANSWERS * SWING:
+                break
         wrong = _stopped(bench) or _answer(joint, moved, by)
         worst = min(worst, float(moved[joint] / by))
     figures["least answer of a joint [1]"] = round(worst, 2)
@@ -176,7 +181,7 @@ def _answer(joint: int, moved: Array, by: float) -> str:
     most = int(np.argmax(np.abs(moved)))
     if moved[joint] * by < 0.0 and abs(moved[joint]) > 0.02:
         return f"{JOINT_NAMES[joint]} was sent by {by:+.2f} rad and moved by {moved[joint]:+.2f}: wrong sign"
-    if abs(moved[joint]) < ANSWERS * abs(by):
-        other = f"; {JOINT_NAMES[most]} moved instead" if abs(moved[most]) > ANSWERS * abs(by) else ""
+    if abs(moved[joint]) < ANSWERS * SWING:
+        other = f"; {JOINT_NAMES[most]} moved instead" if abs(moved[most]) > ANSWERS * SWING else ""
         return f"{JOINT_NAMES[joint]} was sent by {by:+.2f} rad and moved by {moved[joint]:+.3f}{other}"
     return ""
