@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from golem.capabilities.legs.base import Envelope
 from golem.errors import ConfigError
 from golem.evaluation.base import RUNGS, TrialOutcome, TrialSpec, make_rung
 from golem.evaluation.harness.ladder import LadderConfig, run_ladder
-from golem.evaluation.rungs import stand_minute, walk_endurance, walk_rough, walk_stop
+from golem.evaluation.rungs import leg_rung, stand_minute, walk_endurance, walk_rough, walk_stop
 from golem.evaluation.rungs.leg_rung import NO_WALKER
 from golem.evaluation.rungs.walk_twist import command
 
@@ -162,3 +163,21 @@ def test_plans_are_timed_and_the_record_does_not_depend_on_it(monkeypatch: pytes
     outcome = rung.run(TrialSpec("mpc-rate", "mpc", "bench", 0, 0, case={"samples": 8}), None)
     assert outcome.series == {} and outcome.costs["plans_per_second"] > 1.0
     assert 0.0 <= outcome.costs["in_time"] <= 1.0
+
+
+@pytest.mark.parametrize(
+    ("name", "case"),
+    [
+        ("push", {}),
+        ("walk-rough", {"ground": "rubble"}),
+        ("gate-limits", {"lift": "nothing"}),
+        ("push-limit", {"terms": "stack"}),
+        ("tour", {"engine": "mujoco"}),
+    ],
+)
+def test_every_rung_of_legs_stands_at_the_height_that_is_asked_for(
+    name: str, case: dict[str, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(leg_rung, "Episode", lambda *_: SimpleNamespace(height=None))
+    rung: Any = make_rung(RUNGS[name], {"height": 0.8})
+    assert rung.episode(TrialSpec(name, "wbc", "bench", 0, 0, case=case)).height == 0.8

@@ -240,4 +240,4 @@ def _published(line: TableRow, column: TableColumn, label: str) -> str:
 
 def _figure(successes: int, n: int) -> str:
     interval = wilson(successes, n)
-    return f"{100 * successes / n:.1f} [{100 * interval.low:.3g}, {100 * interval.high:.3g}]"
+    return f"{100 * successes / n:.1f} {interval.text(100.0)}"

@@ -17,6 +17,10 @@ class Interval:
     low: float
     high: float
 
+    def text(self, scale: float, sign: str = "") -> str:
+        """Return both ends times `scale`, as `[low, high]`; with `sign` `+` a positive one shows it."""
+        return f"[{scale * self.low:{sign}.3g}, {scale * self.high:{sign}.3g}]"
+
 
 @dataclass(frozen=True, slots=True)
 class Distribution:

@@ -214,6 +214,4 @@ def _median(d: Distribution | None, m: Metric) -> str:
 
 
 def _interval(interval: Interval | None, scale: float, sign: str = "") -> str:
-    if interval is None:
-        return "-"
-    return f"[{scale * interval.low:{sign}.3g}, {scale * interval.high:{sign}.3g}]"
+    return "-" if interval is None else interval.text(scale, sign)

@@ -11,11 +11,11 @@ import numpy as np
 
 from golem.errors import unknown_name
 from golem.evaluation.base import Case, Outcomes, Results, TrialOutcome, TrialSpec
-from golem.evaluation.episodes.episode import Episode, episode_seed
 from golem.evaluation.metrics.statistics import Interval, clustered
 from golem.evaluation.metrics.text_table import TextTable, short_names
 from golem.evaluation.rungs.pushed_rung import PushedOptions, PushedRung, gait_name
 from golem.hardware.safety.base import SafetyLimits
+from golem.stack import Stack
 from golem.types import NUM_JOINTS
 
 Lift = Callable[[SafetyLimits], SafetyLimits]
@@ -111,11 +111,9 @@ class GateLimits(PushedRung[GateLimitsOptions]):
         """Return what trials share that have one past: all but level and direction."""
         return spec.method, spec.index, spec.case["lift"], spec.case["phase"], spec.case["walk"]
 
-    def episode(self, spec: TrialSpec) -> Episode:
-        """Return the robot of a trial, under the gate of its case."""
-        stack = self.stack(spec.method, spec.profile, spec.overrides)
-        limits = lifted(SafetyLimits.from_profile(stack.limits), str(spec.case["lift"]))
-        return Episode(stack, episode_seed(spec.seed, spec.index), self.onlooker, limits)
+    def limits(self, spec: TrialSpec, stack: Stack) -> SafetyLimits:
+        """Return those of the case; see `LegRung`."""
+        return lifted(SafetyLimits.from_profile(stack.limits), str(spec.case["lift"]))
 
     def tables(self, outcomes: Outcomes) -> Sequence[TextTable]:
         """Return how many pushes were survived under each gate, and what ended the others."""
@@ -138,7 +136,7 @@ class GateLimits(PushedRung[GateLimitsOptions]):
                                 gait_name(gait),
                                 f"{level:g}",
                                 lift,
-                                f"{won} of {len(mine)} [{100 * interval.low:.3g}, {100 * interval.high:.3g}]",
+                                f"{won} of {len(mine)} {interval.text(100.0)}",
                                 _ends(mine),
                             )
                         )

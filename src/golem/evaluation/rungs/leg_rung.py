@@ -88,10 +88,18 @@ class LegRung(Rung[O]):
         plant = {"latency": self.options.latency, **robot_options(self.options.robot), **own}
         return legs_stack(method, profile, overrides, plant)
 
-    def episode(self, spec: TrialSpec, limits: SafetyLimits | None = None) -> Episode:
-        """Return the robot of a trial; its gate enforces `limits` if given."""
-        stack = self.stack(spec.method, spec.profile, spec.overrides)
-        episode = Episode(stack, episode_seed(spec.seed, spec.index), self.onlooker, limits)
+    def trial_stack(self, spec: TrialSpec) -> Stack:
+        """Return the stack of a trial, for a rung whose cases differ in it."""
+        return self.stack(spec.method, spec.profile, spec.overrides)
+
+    def limits(self, spec: TrialSpec, stack: Stack) -> SafetyLimits | None:
+        """Return what the gate of a trial enforces; None is what its `stack` says."""
+        return None
+
+    def episode(self, spec: TrialSpec) -> Episode:
+        """Return the robot of a trial, which is to stand at the height that was asked for."""
+        stack = self.trial_stack(spec)
+        episode = Episode(stack, episode_seed(spec.seed, spec.index), self.onlooker, self.limits(spec, stack))
         episode.height = self.options.height
         return episode
 

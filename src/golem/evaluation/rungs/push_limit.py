@@ -12,7 +12,6 @@ import numpy as np
 
 from golem.errors import ConfigError
 from golem.evaluation.base import Case, Outcomes, Results, TrialOutcome, TrialSpec
-from golem.evaluation.episodes.episode import Episode
 from golem.evaluation.episodes.plain_episode import PlainEpisode, own_legs
 from golem.evaluation.harness.arguments import robot_options
 from golem.evaluation.metrics.statistics import wilson
@@ -23,6 +22,7 @@ from golem.evaluation.rungs.leg_rung import NO_WALKER, can_walk
 from golem.evaluation.rungs.pushed_rung import Gait, PushedOptions, PushedRung, gait_name
 from golem.hardware.safety.base import SafetyLimits
 from golem.robots.mujoco.shoves import DIRECTIONS
+from golem.stack import Stack
 
 Terms = Literal["stack", "unstopped", "ungated", "own"]
 LIFTED: dict[str, str] = {"stack": NOTHING, "unstopped": "stops", "ungated": "stops+bounds"}
@@ -111,10 +111,9 @@ class PushLimit(PushedRung[PushLimitOptions]):
         """Return what trials share that have one past: all but level and direction."""
         return spec.method, spec.index, spec.case["terms"], spec.case["phase"], spec.case["walk"]
 
-    def episode(self, spec: TrialSpec, limits: SafetyLimits | None = None) -> Episode:
-        """Return the robot of a trial on the stack's terms, under the gate of its case."""
-        limits = SafetyLimits.from_profile(self.stack(spec.method, spec.profile, spec.overrides).limits)
-        return super().episode(spec, lifted(limits, LIFTED[str(spec.case["terms"])]))
+    def limits(self, spec: TrialSpec, stack: Stack) -> SafetyLimits:
+        """Return those of the case, on the stack's terms; see `LegRung`."""
+        return lifted(SafetyLimits.from_profile(stack.limits), LIFTED[str(spec.case["terms"])])
 
     def pushed(self, specs: Sequence[TrialSpec]) -> Sequence[TrialOutcome]:
         """Push one robot, on the terms of its case; see `PushedRung`."""

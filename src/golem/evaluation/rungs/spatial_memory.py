@@ -192,7 +192,7 @@ class MemoryRung(Rung[Any]):
 
 def _share(values: Sequence[float]) -> str:
     interval = mean_interval(values, 0.0, 1.0)
-    bounds = "" if interval is None else f" [{100 * interval.low:.3g}, {100 * interval.high:.3g}]"
+    bounds = "" if interval is None else f" {interval.text(100.0)}"
     return f"{100 * float(np.mean(values)):.1f}{bounds}"
 
 

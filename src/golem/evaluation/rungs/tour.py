@@ -13,7 +13,7 @@ import numpy as np
 from golem.errors import ConfigError
 from golem.evaluation.base import Case, Outcomes, Results, TrialOutcome, TrialSpec
 from golem.evaluation.episodes import league_tour as league
-from golem.evaluation.episodes.episode import Episode, Loss, episode_seed
+from golem.evaluation.episodes.episode import Episode, Loss
 from golem.evaluation.episodes.scripted_motion import ScriptedMotion
 from golem.evaluation.metrics.statistics import Interval, PairedTable, mcnemar, mean_interval, paired_difference
 from golem.evaluation.metrics.text_table import TextTable, short_names
@@ -25,6 +25,7 @@ from golem.interfaces import topics
 from golem.interfaces.payloads import JointTrajectory
 from golem.provenance import stack_facts
 from golem.robots.model.table import BASE_LINK, JOINT_NAMES
+from golem.stack import Stack
 from golem.types import LEGS, UPPER, Twist
 
 WAYPOINTS, SEGMENT = 18, 5.0
@@ -69,11 +70,13 @@ class Tour(LegRung[TourOptions]):
         stacks = {e: self.stack(method, profile, {**overrides, "robot": e}) for e in self.options.engine}
         return {engine: stack_facts(stack) for engine, stack in stacks.items()}
 
-    def episode(self, spec: TrialSpec) -> Episode:
-        """Return the robot of a trial, in the engine of its case."""
-        stack = self.stack(spec.method, spec.profile, {**spec.overrides, "robot": str(spec.case["engine"])})
-        limits = lifted(SafetyLimits.from_profile(stack.limits), self.options.lift)
-        return Episode(stack, episode_seed(spec.seed, spec.index), self.onlooker, limits)
+    def trial_stack(self, spec: TrialSpec) -> Stack:
+        """Return the stack of a trial, in the engine of its case."""
+        return self.stack(spec.method, spec.profile, {**spec.overrides, "robot": str(spec.case["engine"])})
+
+    def limits(self, spec: TrialSpec, stack: Stack) -> SafetyLimits:
+        """Return those that are not lifted; see `LegRung`."""
+        return lifted(SafetyLimits.from_profile(stack.limits), self.options.lift)
 
     def trial(self, spec: TrialSpec, episode: Episode) -> TrialOutcome:
         """Run one trial; see `LegRung`."""
@@ -162,7 +165,7 @@ def _gap(ours: Mapping[int, TrialOutcome], theirs: Mapping[int, TrialOutcome]) -
 
 
 def _quoted(value: float, interval: Interval | None, scale: float = 1.0) -> str:
-    bounds = f" [{scale * interval.low:+.3g}, {scale * interval.high:+.3g}]" if interval else ""
+    bounds = f" {interval.text(scale, '+')}" if interval else ""
     return f"{scale * value:+.3g}{bounds}"
 
 

@@ -11,11 +11,12 @@ import numpy as np
 
 from golem.errors import unknown_name
 from golem.evaluation.base import Case, Results, TrialOutcome, TrialSpec
-from golem.evaluation.episodes.episode import Episode, episode_seed
+from golem.evaluation.episodes.episode import Episode
 from golem.evaluation.episodes.scripted_motion import ArmMotion, ScriptedMotion
 from golem.evaluation.rungs.leg_rung import LegRung, PlantOptions, judged
 from golem.evaluation.rungs.walk_twist import SETTLE
 from golem.provenance import stack_facts
+from golem.stack import Stack
 from golem.types import Twist
 
 AHEAD = Twist(vx=0.4)
@@ -73,11 +74,9 @@ class WalkRough(LegRung[WalkRoughOptions]):
         grounds = self.options.ground
         return {g: stack_facts(self.stack(method, profile, overrides, GROUNDS[g])) for g in grounds}
 
-    def episode(self, spec: TrialSpec) -> Episode:
-        """Return the robot of a trial, on the ground of its case."""
-        twin = GROUNDS[str(spec.case["ground"])]
-        stack = self.stack(spec.method, spec.profile, spec.overrides, twin)
-        return Episode(stack, episode_seed(spec.seed, spec.index), self.onlooker)
+    def trial_stack(self, spec: TrialSpec) -> Stack:
+        """Return the stack of a trial, on the ground of its case."""
+        return self.stack(spec.method, spec.profile, spec.overrides, GROUNDS[str(spec.case["ground"])])
 
     def trial(self, spec: TrialSpec, episode: Episode) -> TrialOutcome:
         """Run one trial; see `LegRung`."""
