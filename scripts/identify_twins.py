@@ -18,7 +18,7 @@ import yaml
 
 from golem.capabilities.identification import regressor as r
 from golem.capabilities.identification.fit import Identified, identify
-from golem.capabilities.identification.recording import RecordedMotion, read_motion
+from golem.capabilities.identification.recording import read_motion
 from golem.evaluation.identification.identify_command import KEPT, record_motion
 from golem.evaluation.identification.outcome import save, tracking_error
 from golem.robots.model.table import JOINT_NAMES
@@ -57,17 +57,14 @@ def record(seed: int, folder: Path, seconds: float) -> None:
 def judge(seed: int, folder: Path) -> dict[str, object]:
     """Identify one twin and return the errors."""
     hidden, begun = draw(seed), time.process_time()
-    motion = read_motion(folder / "bag")
-    kept = int(KEPT * len(motion.q))
+    kept, rest = read_motion(folder / "bag").split(KEPT)
     weight = r.BARE + float(r.MASSES @ hidden.x[:30])
-    found, weighed = (identify(RecordedMotion(*(rows[:kept] for rows in motion)), w) for w in (None, weight))
-    rest = RecordedMotion(*(rows[kept:] for rows in motion))
+    found, weighed = (identify(kept, w) for w in (None, weight))
     before, after = (tracking_error(x, t, rest) for x, t in ((r.NOMINAL, 0.0), (found.x, found.delay)))
     save(found, folder / "found", "")
     off, mass = found.x - hidden.x, r.MASSES[:28]
     zeros = off[r.ZERO] * 1e3
     others = np.delete(zeros, GAUGE)
-    whole = hidden.x[:30] @ r.MASSES + r.BARE
     return {
         "seed": seed,
         "cpu [s]": round(time.process_time() - begun, 1),
@@ -75,8 +72,8 @@ def judge(seed: int, folder: Path) -> dict[str, object]:
             n: round(100.0 * float(off[:28][s] @ mass[s] / ((1 + hidden.x[:28][s]) @ mass[s])), 2)
             for n, s in LIMBS.items()
         },
-        "mass [%]": round(100.0 * float(off[:30] @ r.MASSES / whole), 2),
-        "mass, weighed [%]": round(100.0 * float((weighed.x - hidden.x)[:30] @ r.MASSES / whole), 2),
+        "mass [%]": round(100.0 * float(off[:30] @ r.MASSES / weight), 2),
+        "mass, weighed [%]": round(100.0 * float((weighed.x - hidden.x)[:30] @ r.MASSES / weight), 2),
         "payload [kg]": [round(float(v), 3) for v in off[r.PAYLOAD]],
         "delay [ms]": round(1e3 * float(found.delay - hidden.delay), 2),
         "friction, worst [%]": round(100.0 * float(np.abs(off[r.FRICTION] / hidden.x[r.FRICTION]).max()), 1),

@@ -20,6 +20,7 @@ LAYERS = (
         "finite",
         "options",
         "output_file",
+        "package_data",
         "traces",
         "registry",
         "user_file",

@@ -24,6 +24,7 @@ from golem.evaluation.report.demo_page import PickRecord, balance_figures, balan
 from golem.output_file import write_file
 from golem.provenance import command_line, commit, versions
 from golem.robots.mujoco.balance import BalanceRecorder
+from golem.robots.mujoco.config import WORKSHOPS
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.mujoco.shoves import Pusher, shove
 from golem.robots.mujoco.spectator import SpectatorView
@@ -305,7 +306,7 @@ def work_place(config: DemoConfig) -> Stack:
     """Return the stack, with its pack as the seed draws it."""
     stack = load_stack(config.stack, profile=config.profile)
     world = stack.choice("robot").options.get("world", "pack")
-    if config.layout == "nominal" or world not in ("pack", "ioniq5"):
+    if config.layout == "nominal" or world not in WORKSHOPS:
         return stack
     return stack.with_options("robot", layout=config.layout, conditions=dict(SHOWN))
 

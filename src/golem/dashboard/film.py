@@ -23,6 +23,7 @@ from golem.interfaces import topics
 from golem.interfaces.payloads import GateState
 from golem.robots.model.table import BASE_LINK
 from golem.robots.mujoco.balance import BalanceRecorder
+from golem.robots.mujoco.config import WORKSHOPS
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.mujoco.spectator import Shot, SpectatorView
 from golem.runtime.lockstep import LockstepRunner
@@ -61,7 +62,7 @@ SAFETY_COLOURS = {
 def shots(robot: MujocoRobot) -> dict[str, Shot]:
     """Return the cameras that show `robot` at work: `wide` and `close`, which is on the tray's side."""
     found = STANDING if robot.config.support == "ground" else HANGING
-    if robot.config.world not in ("pack", "ioniq5") or robot.scene.layout.tray_xy[1] < 0.0:
+    if robot.config.world not in WORKSHOPS or robot.scene.layout.tray_xy[1] < 0.0:
         return found
     close = found["close"]
     x, y, z = close.look_at

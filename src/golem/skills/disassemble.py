@@ -13,7 +13,7 @@ from golem.skills.dock import DockReport
 from golem.skills.fastener_list import read_list
 from golem.skills.inventory import write_inventory
 from golem.skills.job_file import JobFile
-from golem.skills.kept_file import KeptFileConfig
+from golem.skills.kept_file import KeptFileConfig, no_link
 from golem.skills.pack_job import PackJob
 from golem.skills.pick_report import PickOutcome, PickReport, Sight
 
@@ -56,9 +56,7 @@ class Disassemble:
                 f"The legs, '{context.legs.status.controller}', do not walk; choose others, such as almi."
             )
         listed = read_list(self._folder / goal.list, {*goal.screws, *goal.nuts}) if goal.list else ()
-        path = self._folder / (goal.job or f"{goal.list.removesuffix('.csv')}.sqlite")
-        if path.is_symlink():
-            raise ConfigError(f"'{path}' is a link; choose another name.")
+        path = no_link(self._folder / (goal.job or f"{goal.list.removesuffix('.csv')}.sqlite"))
         book = await context.think(lambda: JobFile(path, listed), 0.0)
         job = PackJob(context, goal, book)
         try:

@@ -9,6 +9,7 @@ from io import StringIO
 from pathlib import Path
 
 from golem.errors import OutputError
+from golem.output_file import write_file
 from golem.skills.job_file import Fate, JobFile, PackFastener
 
 COLUMNS = (
@@ -41,12 +42,8 @@ def write_inventory(book: JobFile) -> Path:
     )
     if page.is_symlink() or page.with_suffix(".csv").is_symlink():
         raise OutputError(f"The inventory '{page}' is a link, which is not written to; take it away.")
-    try:
-        page.with_suffix(".csv").write_text(table.getvalue(), encoding="utf-8")
-        page.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise OutputError(f"The inventory '{page}' cannot be written: {error.strerror}.") from error
-    return page
+    write_file(page.with_suffix(".csv"), table.getvalue())
+    return write_file(page, text)
 
 
 def _row(one: PackFastener) -> tuple[str, ...]:

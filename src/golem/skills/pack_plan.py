@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from golem.skills.job_file import PackFastener
-from golem.skills.stance_choice import ABOVE, LOOK_TURN, OVER_TRAY, seen_from, within_reach
+from golem.skills.stance_choice import LOOK_TURN, drops_into, seen_from, takes
 from golem.types import SIDES, Array, PlanarPose, Side
 
 INSET = 0.022
@@ -133,7 +133,7 @@ def make_plan(
         for stance, hand in one.barred:
             gone = [stance.to(p) for p in poses]
             same = [math.hypot(g.x, g.y) < BARRED[0] and abs(g.yaw) < BARRED[1] for g in gone]
-            quality[SIDES.index("left" if hand == "left" else "right"), same, f] = 0.0
+            quality[SIDES.index(hand), same, f] = 0.0
     best = quality.max(axis=0)
     served = best > np.where(best.max(axis=0) > NEED, NEED, 0.0)
     ring = np.array([sides.ring(p) for p in poses])
@@ -162,12 +162,9 @@ def _quality(stances: Array, wanted: Sequence[PackFastener], containers: Mapping
         places, trays = np.array([wanted[f].place for f in mine]) + lift, containers.get(label)
         seen = np.any([seen_from(stances, places, turn) for turn in (0.0, LOOK_TURN, -LOOK_TURN)], axis=0)
         for k, side in enumerate(SIDES):
-            near = (
-                np.minimum(within_reach(stances, places, side), within_reach(stances, places + (0.0, 0.0, ABOVE), side))
-                * seen
-            )
+            near = takes(stances, places, side) * seen
             if trays is not None:
-                near *= within_reach(stances, trays + lift + (0.0, 0.0, OVER_TRAY), side).max(axis=1, keepdims=True)
+                near *= drops_into(stances, trays + lift, side).max(axis=1, keepdims=True)
             quality[k][:, mine] = near
     return quality
 

@@ -17,8 +17,6 @@ from golem.robots.model.table import DOF, FRAMES, JOINT_NAMES, JOINTS, LINKS
 from golem.types import LEGS, NUM_JOINTS, SIDES, Array
 
 ROOT = "torso_link"
-BALL = 0.04
-"""Radius of the ball that a payload is taken for [m], as in the twin."""
 _HINGES = (pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ)
 WRISTS, HAND = [f"{side}_wrist_yaw_link" for side in SIDES], magpie_model.lump().moved(magpie_model.T_WRIST_HAND)
 """Names of the links that carry hands, and the mass of those in them, fingers half open."""
@@ -49,9 +47,8 @@ BARE = float(MASSES[MASS].sum()) + 2.0 * magpie_model.lump().mass
 
 
 def payload(mass: float) -> Inertial:
-    """Return the ball of `mass` [kg] at the grasp frame, in the wrist's link."""
-    at = (magpie_model.T_WRIST_HAND @ magpie_model.T_HAND_GRIPPER)[:3, 3]
-    return Inertial(mass, at, 0.4 * mass * BALL**2 * np.eye(3))
+    """Return what is held, of `mass` [kg], in the wrist's link."""
+    return magpie_model.payload(mass).moved(magpie_model.T_WRIST_HAND)
 
 
 def links(x: Array, loaded: bool = False) -> dict[str, Inertial]:

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import tyro
-import yaml
 
 from golem.errors import ConfigError, OutputError, unknown_name
 from golem.evaluation.conformance.examine import SUITES
+from golem.package_data import load_data
 
 TEMPLATES = "templates"
 SLOT_HELP = f"Which slot the module is for: {', '.join(SUITES)}."
@@ -44,7 +44,7 @@ def run_new(config: NewConfig, folder: Path = Path()) -> list[Path]:
     words = {"slot": slot, "name": name, "cls": "".join(word.capitalize() for word in name.split("_"))}
     templates = resources.files(__package__ or "") / TEMPLATES
     source = (templates / f"{slot}.py.txt").read_text(encoding="utf-8").replace("Mine", words["cls"])
-    texts: dict[str, Any] = yaml.safe_load((templates / "texts.yaml").read_text(encoding="utf-8"))
+    texts: dict[str, Any] = load_data(__package__, f"{TEMPLATES}/texts.yaml")
     files = {
         folder / f"{name}.py": source,
         folder / f"test_{name}.py": texts["test"].format(**words),

@@ -9,7 +9,7 @@ from pathlib import Path
 from tyro.conf import Positional
 
 from golem.capabilities.identification.fit import identify
-from golem.capabilities.identification.recording import COMMAND, STATE, RecordedMotion, read_motion
+from golem.capabilities.identification.recording import COMMAND, STATE, read_motion
 from golem.capabilities.identification.regressor import NOMINAL, PAYLOAD
 from golem.errors import ConfigError
 from golem.evaluation.identification.outcome import BODY, PROFILE, REPORT, save, tracking_error
@@ -81,10 +81,8 @@ def run_identify(config: IdentifyConfig) -> None:
     if config.motion:
         record_motion(load_stack(config.stack, profile=config.profile), config.seed, config.bag)
         return
-    motion = read_motion(config.bag)
-    kept = int(KEPT * len(motion.q))
-    found = identify(RecordedMotion(*(rows[:kept] for rows in motion)), config.weight)
-    rest = RecordedMotion(*(rows[kept:] for rows in motion))
+    kept, rest = read_motion(config.bag).split(KEPT)
+    found = identify(kept, config.weight)
     before, after = (tracking_error(x, t, rest) * 1e3 for x, t in ((NOMINAL, 0.0), (found.x, found.delay)))
     said = (
         f"Joints of the last {100 * (1 - KEPT):.0f} % of the motion, which played no part: missed by {before:.1f} mrad "

@@ -12,7 +12,7 @@ import yaml
 from golem.capabilities.identification import regressor as r
 from golem.capabilities.identification.fit import Identified, low_passed
 from golem.capabilities.identification.recording import RecordedMotion
-from golem.errors import OutputError
+from golem.output_file import write_file
 from golem.robots.model import mjcf
 from golem.robots.model.imu_mount import TORSO
 from golem.robots.model.limits import load_limits
@@ -95,10 +95,6 @@ def save(found: Identified, folder: Path, said: str) -> None:
     own |= {"actuator_delay": found.delay, "zeros": zeros, "motors": motors}
     rows = zip(r.NAMES, np.column_stack([found.x, found.sigma, r.NOMINAL]).round(5).tolist(), strict=True)
     report = {"found, standard deviation, model": dict(rows), "not told": found.unknown}
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / BODY).write_text(spec.to_xml(), encoding="utf-8")
-        (folder / PROFILE).write_text(yaml.safe_dump(own, sort_keys=False), encoding="utf-8")
-        (folder / REPORT).write_text(f"# {said}\n{yaml.safe_dump(report, sort_keys=False)}", encoding="utf-8")
-    except OSError as error:
-        raise OutputError(f"Cannot write {folder}: {error.strerror}.") from error
+    write_file(folder / BODY, spec.to_xml())
+    write_file(folder / PROFILE, yaml.safe_dump(own, sort_keys=False))
+    write_file(folder / REPORT, f"# {said}\n{yaml.safe_dump(report, sort_keys=False)}")

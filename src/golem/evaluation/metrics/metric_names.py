@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from importlib.resources import files
 from typing import Any
 
-import yaml
+from golem.package_data import load_data
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,8 +41,7 @@ SCALES = {"deg": math.degrees(1.0), "%": 100.0}
 
 
 def _metrics() -> dict[str, Metric]:
-    text = (files(__package__ or "") / "metrics.yaml").read_text(encoding="utf-8")
-    rows: dict[str, dict[str, Any]] = yaml.load(text, getattr(yaml, "CSafeLoader", yaml.SafeLoader))
+    rows: dict[str, dict[str, Any]] = load_data(__package__, "metrics.yaml")
     for row in rows.values():
         row.setdefault("scale", SCALES.get(row.get("unit", ""), 1.0))
     return {name: Metric(**row) for name, row in rows.items()}

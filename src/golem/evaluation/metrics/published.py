@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from importlib.resources import files
 
-import yaml
+from golem.package_data import load_data
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +29,7 @@ GGX_F = "{use: reranked, proposer: {use: graspgen}}"
 
 def _paper() -> dict[tuple[str, str], tuple[PaperFigure, ...]]:
     found: dict[tuple[str, str], tuple[PaperFigure, ...]] = {}
-    for row in yaml.safe_load((files(__package__ or "") / "published.yaml").read_text(encoding="utf-8")):
+    for row in load_data(__package__, "published.yaml"):
         rung, method = row.pop("rung"), row.pop("method")
         key = rung, GGX_F if method == "GGX-F" else method
         found[key] = (*found.get(key, ()), PaperFigure(**row))

@@ -35,6 +35,7 @@ from golem.skills.base import SkillResult
 from golem.skills.context import Context
 from golem.skills.disassemble_goal import DisassembleGoal, DisassembleReport
 from golem.skills.navigate import NavigateGoal
+from golem.skills.pack_job import CONTENT, STAGE
 from golem.skills.pick_config import PickGoal
 from golem.skills.pick_report import PickOutcome, PickReport
 from golem.stack import Stack, load_stack
@@ -46,10 +47,6 @@ PLACEMENT = (0.0683, 0.1143)
 """Standard deviations of the paper's placement ahead and to the left [m]: a mean radial error of 13.0 cm."""
 TURN = math.radians(4.0)
 """The same of the heading [rad] [own: the paper gives none]."""
-STAGE = 0.75
-"""Distance before the stance up to which the navigator brings the robot [m]: nearer its arms are above the pack."""
-NEAR = 0.1
-"""Distance from there with which it is content [m]."""
 STILL = 4.0
 """Time the robot stands before anything begins [s]: the odometry starts from rest."""
 WALK = 120.0
@@ -186,7 +183,7 @@ class _Trial:
     def _come(self) -> TrialOutcome | None:
         """Walk to the pack; return how that failed, or None where it did not."""
         stage = self._stance @ PlanarPose(-STAGE, 0.0, 0.0)
-        came = self._walk("navigate", NavigateGoal(stage.x, stage.y, stage.yaw, "map", WALK, NEAR))
+        came = self._walk("navigate", NavigateGoal(stage.x, stage.y, stage.yaw, "map", WALK, CONTENT))
         return came or (None if self._docks else self._walk(ByMap(), self._stance))
 
     def _walk(self, skill: str | ByMap, goal: object) -> TrialOutcome | None:

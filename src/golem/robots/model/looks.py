@@ -13,9 +13,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from golem.package_data import load_data
 from golem.robots.model import magpie_model
 from golem.robots.model.spatial import quat_of, rotation_rpy
-from golem.robots.model.table import load_data
 from golem.types import Array
 
 Axis = Literal["x", "y", "z"]
@@ -100,7 +100,7 @@ VISUAL_GROUP = 2
 """Geom group of everything in this module."""
 
 Material = Literal["shell", "graphite", "joint", "visor", "rubber", "accent", "glow", "metal"]
-DATA: dict[str, Any] = load_data("looks.yaml")
+DATA: dict[str, Any] = load_data(__package__, "looks.yaml")
 """Materials, and parts by where they are."""
 _KINDS = {
     "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER,

@@ -108,6 +108,11 @@ def mirror(finger: Finger, point: Array) -> Array:
     return point * (1.0, 1.0 if finger == "a" else -1.0, 1.0)
 
 
+def payload(mass: float) -> Inertial:
+    """Return what is held, in the hand frame: a ball of 4 cm and of `mass` [kg] where the fingers meet."""
+    return Inertial(mass, T_HAND_GRIPPER[:3, 3], 0.4 * mass * 0.04**2 * np.eye(3))
+
+
 def lump(theta: float = MID) -> Inertial:
     """Return the mass properties of the whole hand in the hand frame with both cranks held at `theta` [rad]."""
     c, s = np.cos(theta), np.sin(theta)

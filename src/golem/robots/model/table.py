@@ -6,12 +6,11 @@ The rows are in `h12.yaml`, beside this file, each with its source.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
-import yaml
 
+from golem.package_data import load_data
 from golem.robots.model.spatial import Inertial, rotation_rpy, transform
 from golem.types import Array
 
@@ -84,16 +83,7 @@ def _joint(row: dict[str, Any]) -> Joint:
     )
 
 
-_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
-"""The same in C, where PyYAML has it: every process reads the table."""
-
-
-def load_data(name: str) -> dict[str, Any]:
-    """Return the content of a YAML file beside this one."""
-    return yaml.load((files(__package__ or "") / name).read_text(encoding="utf-8"), _LOADER)
-
-
-_DATA = load_data("h12.yaml")
+_DATA: dict[str, Any] = load_data(__package__, "h12.yaml")
 
 JOINTS: tuple[Joint, ...] = tuple(_joint(row) for row in _DATA["joints"])
 """The 27 joints in the motor order of the vendor's SDK."""

@@ -17,9 +17,9 @@ World = Literal[
     "pack", "ioniq5", "plant", "ioniq5_plant",
     "open", "slope", "step", "rubble", "furnished", "corridor", "kitchen", "counter",
 ]  # fmt: skip
-IONIQ5, PLANTS = ("ioniq5", "ioniq5_plant"), ("plant", "ioniq5_plant")
-"""Worlds with the real pack, and those with a pack in a furnished hall."""
-WITH_PACK = ("pack", *PLANTS, "ioniq5")
+IONIQ5, PLANTS, WORKSHOPS = ("ioniq5", "ioniq5_plant"), ("plant", "ioniq5_plant"), ("pack", "ioniq5")
+"""Worlds with the real pack, those with a pack in a furnished hall, and those with one in a workshop."""
+WITH_PACK = (*WORKSHOPS, *PLANTS)
 """Worlds with a pack to work on."""
 KITCHENS = ("kitchen", "counter")
 """Worlds with a fridge and a counter."""

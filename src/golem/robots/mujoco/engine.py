@@ -17,7 +17,7 @@ from golem.robots.model.leg_kinematics import leg_poses, sole_centers
 from golem.robots.model.limits import load_limits
 from golem.robots.model.table import BASE_LINK
 from golem.robots.mujoco.camera import CameraRig
-from golem.robots.mujoco.config import MujocoConfig
+from golem.robots.mujoco.config import WORKSHOPS, MujocoConfig
 from golem.robots.mujoco.external_forces import Pushes
 from golem.robots.mujoco.hand_servos import HandServos
 from golem.robots.mujoco.hoist import Hoist
@@ -99,7 +99,7 @@ class MujocoRobot:
             name: AutoExposure(conditions.light, stream(seed, f"exposure/{name}"), self.profile.colour_noise)
             for name in CAMERAS
         }
-        self._mirrors = mirror_geoms(model, conditions) if self.config.world in ("pack", "ioniq5") else None
+        self._mirrors = mirror_geoms(model, conditions) if self.config.world in WORKSHOPS else None
         self._memory = memory = new_record(TWIN)
         noise = stream(seed, "imu")
         self._imu_model = ImuModel(self.profile.imu, self._errors.imu, noise, memory["imu"])

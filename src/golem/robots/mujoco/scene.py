@@ -12,7 +12,7 @@ from golem.errors import ConfigError
 from golem.robots.model import contact_shapes, magpie_model, mjcf
 from golem.robots.model.looks import VISUAL_GROUP
 from golem.robots.model.table import BASE_LINK, JOINT_NAMES
-from golem.robots.mujoco.config import IONIQ5, KITCHENS, PLANTS, WITH_PACK, MujocoConfig
+from golem.robots.mujoco.config import IONIQ5, KITCHENS, PLANTS, WITH_PACK, WORKSHOPS, MujocoConfig
 from golem.robots.mujoco.tag_plates import add_tag_cuffs
 from golem.robots.sensors.profiles import RealismProfile
 from golem.robots.sensors.streams import stream
@@ -120,7 +120,7 @@ def _build(spec: mujoco.MjSpec, config: MujocoConfig, layout: PackLayout, profil
         layout = replace(layout, empty_holes=(*layout.empty_holes, *places.missing))
         draws = draw_screws(stream(seed, "world/screws"), profile.screws, places.loose, layout.kind)
         layout = layout.seen_with(stance)
-        names = add_pack(spec, layout, draws, stance=stance, workshop=config.world not in PLANTS)
+        names = add_pack(spec, layout, draws, stance=stance, workshop=config.world in WORKSHOPS)
         add_clutter(spec, layout, round(conditions.clutter), stream(seed, "world/clutter"))
         dress(spec, conditions, stance)
         _add_onlooker(spec, layout)
@@ -237,14 +237,14 @@ def _strip_world(spec: mujoco.MjSpec) -> None:
 
 
 def _add_payload(hand: mujoco.MjsBody, mass: float) -> None:
-    """Fix a ball of `mass` [kg] where the fingers meet; it touches nothing, and no camera sees it."""
-    radius = 0.04
+    """Fix what weighs `mass` [kg] to a hand; it touches nothing, and no camera sees it."""
+    held = magpie_model.payload(mass)
     hand.add_body(
         name=f"{hand.name}_payload",
-        pos=magpie_model.T_HAND_GRIPPER[:3, 3],
+        pos=held.com,
         ipos=[0.0, 0.0, 0.0],  # MuJoCo takes `pos` again where it is not said
-        mass=mass,
-        inertia=[0.4 * mass * radius**2] * 3,
+        mass=held.mass,
+        inertia=np.diag(held.inertia),
         explicitinertial=True,
     )
 

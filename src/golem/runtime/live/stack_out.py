@@ -65,7 +65,8 @@ def encoders(bus: Bus, mode_machine: Callable[[], int], joint_offset: Array | No
             command = replace(command, q=command.q + joint_offset)
         return encode_low_command(command, mode_machine(), answers=state.t)
 
-    felt = {public.wrench(side): partial(_felt, HandForce(), side, deque(maxlen=MEAN)) for side in SIDES}
+    force = HandForce()
+    felt = {public.wrench(side): partial(_felt, force, side, deque(maxlen=MEAN)) for side in SIDES}
     return {"/odom": odometry, "/tf": frames, "/safety/lowcmd_in": request, **felt}
 
 

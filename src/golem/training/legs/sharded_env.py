@@ -61,7 +61,6 @@ class ShardedEnv:
         self.difficulty = Difficulty()
         self.terms: dict[str, float] = {}
         self.cpu = 0.0
-        self._seed = seed
         self._alone = _Shard(self.rows, config, (seed, 0)) if shards == 1 else None
         self._links: list[Connection] = []
         self._processes: list[SpawnProcess] = []
