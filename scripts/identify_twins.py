@@ -19,7 +19,7 @@ import yaml
 from golem.capabilities.identification import regressor as r
 from golem.capabilities.identification.fit import Identified, identify
 from golem.capabilities.identification.recording import read_motion
-from golem.evaluation.identification.identify_command import KEPT, record_motion
+from golem.evaluation.identification.identify_command import halves, record_motion
 from golem.evaluation.identification.outcome import save, tracking_error
 from golem.robots.model.table import JOINT_NAMES
 from golem.stack import load_stack
@@ -57,7 +57,7 @@ def record(seed: int, folder: Path, seconds: float) -> None:
 def judge(seed: int, folder: Path) -> dict[str, object]:
     """Identify one twin and return the errors."""
     hidden, begun = draw(seed), time.process_time()
-    kept, rest = read_motion(folder / "bag").split(KEPT)
+    kept, rest = halves(read_motion(folder / "bag"))
     weight = r.BARE + float(r.MASSES @ hidden.x[:30])
     found, weighed = (identify(kept, w) for w in (None, weight))
     before, after = (tracking_error(x, t, rest) for x, t in ((r.NOMINAL, 0.0), (found.x, found.delay)))

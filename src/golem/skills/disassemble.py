@@ -13,7 +13,7 @@ from golem.skills.dock import DockReport
 from golem.skills.fastener_list import read_list
 from golem.skills.inventory import write_inventory
 from golem.skills.job_file import JobFile
-from golem.skills.kept_file import KeptFileConfig, no_link
+from golem.skills.kept_file import KeptFileConfig, kept_file
 from golem.skills.pack_job import PackJob
 from golem.skills.pick_report import PickOutcome, PickReport, Sight
 
@@ -56,7 +56,7 @@ class Disassemble:
                 f"The legs, '{context.legs.status.controller}', do not walk; choose others, such as almi."
             )
         listed = read_list(self._folder / goal.list, {*goal.screws, *goal.nuts}) if goal.list else ()
-        path = no_link(self._folder / (goal.job or f"{goal.list.removesuffix('.csv')}.sqlite"))
+        path = kept_file(str(self._folder), goal.job or f"{goal.list.removesuffix('.csv')}.sqlite", lambda _: None)
         book = await context.think(lambda: JobFile(path, listed), 0.0)
         job = PackJob(context, goal, book)
         try:

@@ -12,10 +12,7 @@ from golem.errors import OutputError
 from golem.output_file import write_file
 from golem.skills.job_file import Fate, JobFile, PackFastener
 
-COLUMNS = (
-    *("name", "class", "x", "y", "z", "said_loose", "fate", "reason", "tries", "hand", "tray", "stance", "robot_s"),
-    *("date_utc", "picture"),
-)
+COLUMNS = "name class x y z said_loose fate reason tries hand tray stance robot_s date_utc picture".split()
 COLOURS = {Fate.IN_TRAY: "#2a2", Fate.OPEN: "#888", Fate.TIGHT: "#c80", Fate.JAMMED: "#c80"}
 SCALE = 400.0
 """Pixels per metre of the plan."""

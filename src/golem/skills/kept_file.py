@@ -43,17 +43,6 @@ def check_file_name(name: str, ending: str = "") -> None:
         )
 
 
-def no_link(path: Path) -> Path:
-    """Return a path that is no link.
-
-    Raises:
-        ConfigError: it is one: what is written there would be written elsewhere.
-    """
-    if path.is_symlink():
-        raise ConfigError(f"'{path}' is a link; choose another name.")
-    return path
-
-
 def kept_file(folder: str, name: str, read: Callable[[Path], object]) -> Path:
     """Return the path of the file `name`, which `check_file_name` has passed, in `folder`.
 
@@ -62,7 +51,9 @@ def kept_file(folder: str, name: str, read: Callable[[Path], object]) -> Path:
     Raises:
         ConfigError: there is a link or something else of that name.
     """
-    path = no_link(Path(folder) / name)
+    path = Path(folder) / name
+    if path.is_symlink():
+        raise ConfigError(f"'{path}' is a link; choose another name.")
     if path.exists():
         try:
             read(path)

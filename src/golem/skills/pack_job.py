@@ -23,6 +23,7 @@ from golem.skills.pack_plan import PackSides, PackStop, make_plan
 from golem.skills.pack_view import NOTHING, see_edge, see_fasteners
 from golem.skills.pick_config import PickGoal
 from golem.skills.pick_report import PickOutcome, PickReport, Sight, Tried
+from golem.skills.pick_targets import WANTED
 from golem.types import Array, PlanarPose, Side
 
 ORDER = ("near", "left", "far", "right")
@@ -33,8 +34,6 @@ TRIES = 2
 """How often a fastener is tried, from two stances or with two hands where there are such."""
 STRIKES = 3
 """Stops in a row that the robot does not get to, or where no container is seen, after which the job ends."""
-SAME = 0.045
-"""What is seen this near to where a fastener is listed is that one [m]: half the pitch along the long sides."""
 SHIFTED = 0.3
 """Farthest that the container may be seen from where it is listed, for the pack to be found by it [m]."""
 LONG = 0.25
@@ -134,7 +133,7 @@ class PackJob:
         plan = await self._context.think(lambda: make_plan(*args), PLANNING)
         served, walk = sum(len(stop.picks) for stop in plan), sum(stop.way for stop in plan)
         text = f"{len(plan)} stops, {walk:.1f} m of way, for {served} of {len(todo)} fasteners."
-        stops = [[s.pose.x, s.pose.y, s.pose.yaw, s.height, *(number for number, _ in s.picks)] for s in plan]
+        stops = [[s.pose.x, s.pose.y, s.pose.yaw, *(number for number, _ in s.picks)] for s in plan]
         fates = [[*one.place.tolist(), one.fate.value] for one in self._book.fasteners]
         self._context.say("plan", text, stops=stops, fasteners=fates)
         return plan
@@ -224,7 +223,7 @@ class PackJob:
             away = T[:2, :2] @ seen.tray[:2] + T[:2, 3] - boxes
             nearest = away[int(np.linalg.norm(away, axis=1).argmin())]
             shift = nearest if np.linalg.norm(nearest) < SHIFTED else shift
-        a, b = matched(known[:, :2] + shift, places, SAME)
+        a, b = matched(known[:, :2] + shift, places, WANTED)
         if not len(a):
             return
         moved, _ = fit_frames(a - shift, b)
@@ -239,7 +238,7 @@ class PackJob:
         seen = await see_fasteners(self._context, one.label, self._container(one.label), NOTHING, False)
         T = self._context.T_odom_base
         places = seen.places @ T[:3, :3].T + T[:3, 3]
-        return bool((np.linalg.norm(places[:, :2] - self._in_odom(one), axis=1) < SAME).any())
+        return bool((np.linalg.norm(places[:, :2] - self._in_odom(one), axis=1) < WANTED).any())
 
     async def _take(self, one: PackFastener, side: Side) -> PickOutcome:
         """Try one fastener, and keep what came of it."""
@@ -280,9 +279,9 @@ class PackJob:
         """Return which fastener a hand was at that was sent to `one`, and learn what the palm cameras are off by."""
         place = np.array([tried.x, tried.y])
         away = np.linalg.norm([place - self._off - self._in_odom(each) for each in self._book.fasteners], axis=1)
-        if np.linalg.norm(place - self._in_odom(one)) < SAME:
+        if np.linalg.norm(place - self._in_odom(one)) < WANTED:
             self._off = 0.5 * (self._off + place - self._in_odom(one))
-        return self._book.fasteners[int(away.argmin())] if away.min() < SAME / 2 else one
+        return self._book.fasteners[int(away.argmin())] if away.min() < WANTED / 2 else one
 
     async def _tell(
         self, one: PackFastener, fate: Fate, reason: str = "", side: str = "", tray: str = "",

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from golem.skills.job_file import PackFastener
-from golem.skills.stance_choice import LOOK_TURN, drops_into, seen_from, takes
+from golem.skills.stance_choice import LOOK_TURN, OVER_TRAY, seen_from, takes, within_reach
 from golem.types import SIDES, Array, PlanarPose, Side
 
 INSET = 0.022
@@ -50,13 +50,11 @@ class PackStop:
 
     Attributes:
         pose: of base_link in the pack frame.
-        height: of base_link over the pack's rim that the reach was computed for [m].
         picks: numbers of the fasteners and the hands, in order.
         way: way there from the stop before, around the pack [m].
     """
 
     pose: PlanarPose
-    height: float
     picks: tuple[tuple[int, Side], ...]
     way: float
 
@@ -148,7 +146,7 @@ def make_plan(
         mine.sort(key=lambda f: (hands[f], poses[s].to(PlanarPose(wanted[f].listed.x, wanted[f].listed.y, 0.0)).y))
         way = abs(math.remainder(ring[s] - at, sides.length))
         if mine:
-            stops.append(PackStop(poses[s], -rim, tuple((wanted[f].number, hands[f]) for f in mine), way))
+            stops.append(PackStop(poses[s], tuple((wanted[f].number, hands[f]) for f in mine), way))
             at = ring[s]
     return stops
 
@@ -164,7 +162,7 @@ def _quality(stances: Array, wanted: Sequence[PackFastener], containers: Mapping
         for k, side in enumerate(SIDES):
             near = takes(stances, places, side) * seen
             if trays is not None:
-                near *= drops_into(stances, trays + lift, side).max(axis=1, keepdims=True)
+                near *= within_reach(stances, trays + lift + (0.0, 0.0, OVER_TRAY), side).max(axis=1, keepdims=True)
             quality[k][:, mine] = near
     return quality
 

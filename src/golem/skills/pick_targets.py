@@ -85,7 +85,7 @@ MOST = 0.5
 SAME = 0.04
 """What two looks show this near to each other is one object [m]; screws stand 9 cm apart."""
 WANTED = 0.045
-"""How far from where it is wanted the head camera may show an object [m]."""
+"""How far from where it is wanted, or listed, the head camera may show an object [m]: half a pitch."""
 
 
 @dataclass(frozen=True, slots=True)

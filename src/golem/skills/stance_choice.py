@@ -113,7 +113,7 @@ def _judged(stances: Array, screws: Array, weights: Array, tray: Array | None) -
     for side in SIDES:
         room = takes(stances, screws, side)
         if tray is not None:
-            room = room * drops_into(stances, tray[None], side)
+            room = room * within_reach(stances, (tray + (0.0, 0.0, OVER_TRAY))[None], side)
         best = np.maximum(best, room)
     best = best * seen
     quality = np.sort(best * weights, axis=1)[:, ::-1][:, :COUNT].sum(axis=1) / COUNT
@@ -141,15 +141,10 @@ def seen_from(stances: Array, points: Array, turn: float) -> NDArray[np.bool_]:
 def takes(stances: Array, fasteners: Array, side: Side) -> Array:
     """Return (s, n) how far within reach of a hand fasteners (n, 3), and the places above them, are; 0 to 1."""
     above = fasteners + (0.0, 0.0, ABOVE)
-    return np.minimum(_within_reach(stances, fasteners, side), _within_reach(stances, above, side))
+    return np.minimum(within_reach(stances, fasteners, side), within_reach(stances, above, side))
 
 
-def drops_into(stances: Array, containers: Array, side: Side) -> Array:
-    """Return (s, n) how far within reach of a hand the places over containers (n, 3) are; 0 to 1."""
-    return _within_reach(stances, containers + (0.0, 0.0, OVER_TRAY), side)
-
-
-def _within_reach(stances: Array, points: Array, side: Side) -> Array:
+def within_reach(stances: Array, points: Array, side: Side) -> Array:
     """Return (s, n) how far within reach points (n, 3) are from stances (s, 3): 0 out of reach, 1 from `ROOM` on."""
     c, s = np.cos(stances[:, 2:]), np.sin(stances[:, 2:])
     x, y = points[:, 0] - stances[:, :1], points[:, 1] - stances[:, 1:2]

@@ -11,9 +11,11 @@ import pytest
 from golem.capabilities.odometry.base import LidarOdometry, OdometryEstimate
 from golem.capabilities.odometry.error_state import ImuNoise
 from golem.capabilities.odometry.lio import Lio, LioConfig
-from golem.evaluation.conformance.room import ROOM, TUNNEL, MadeWalk, Reading
+from golem.evaluation.conformance.room import HEIGHT, ROOM, MadeWalk, Reading
 from golem.interfaces.lidar import LegOdometry, LidarImu, LidarScan
 
+TUNNEL = np.array([[-1e3, 1e3], [-1.2, 1.2], [-HEIGHT, 2.5]])
+"""A box without ends."""
 WALK = MadeWalk(ROOM, every=5)
 Change = Callable[[LidarScan], LidarScan | None]
 

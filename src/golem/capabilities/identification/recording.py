@@ -37,11 +37,6 @@ class RecordedMotion(NamedTuple):
     acc: Array
     command: Array
 
-    def split(self, share: float) -> tuple[RecordedMotion, RecordedMotion]:
-        """Return the first `share` of the motion, and the rest."""
-        at = int(share * len(self.q))
-        return RecordedMotion(*(rows[:at] for rows in self)), RecordedMotion(*(rows[at:] for rows in self))
-
 
 def read_motion(path: Path) -> RecordedMotion:
     """Read the longest stretch in which all motors were stiff and commands came.

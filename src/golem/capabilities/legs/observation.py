@@ -53,8 +53,6 @@ _BATCHED = {term: TERMS[term] for term in ("base_velocity", "base_rate", "gravit
     "phase_cos": SIDES,
 }
 _KEYS = [(term, name) for term in _BATCHED for name in _BATCHED[term]]
-BATCHED = len(_KEYS)
-"""How many signals `ObservationLayout.observe` knows, those of `Signals`."""
 _KEYS += [("orientation", name) for name in TERMS["orientation"]] + [("one", "value")]
 _KEYS += [("last_action", name) for name in JOINT_NAMES[UPPER]]
 SIGNALS = len(_KEYS)

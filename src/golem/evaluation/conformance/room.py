@@ -20,8 +20,6 @@ BIAS: Array = np.array([0.002, -0.003, 0.001])
 """Of the gyro [rad/s]."""
 ROOM: Array = np.array([[-3.0, 9.0], [-4.0, 5.0], [-HEIGHT, 2.5]])
 """Least and greatest x, y, z of the box [m]."""
-TUNNEL: Array = np.array([[-1e3, 1e3], [-1.2, 1.2], [-HEIGHT, 2.5]])
-"""A box without ends."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from pathlib import Path
 from tyro.conf import Positional
 
 from golem.capabilities.identification.fit import identify
-from golem.capabilities.identification.recording import COMMAND, STATE, read_motion
+from golem.capabilities.identification.recording import COMMAND, STATE, RecordedMotion, read_motion
 from golem.capabilities.identification.regressor import NOMINAL, PAYLOAD
 from golem.errors import ConfigError
 from golem.evaluation.identification.outcome import BODY, PROFILE, REPORT, save, tracking_error
@@ -70,6 +70,12 @@ def record_motion(stack: Stack, seed: int, bag: Path, seconds: float = 60.0) -> 
     print(f"{writer}.")
 
 
+def halves(motion: RecordedMotion) -> tuple[RecordedMotion, RecordedMotion]:
+    """Return what is identified from, the first `KEPT` of a motion, and the rest, which is held out."""
+    at = int(KEPT * len(motion.q))
+    return RecordedMotion(*(rows[:at] for rows in motion)), RecordedMotion(*(rows[at:] for rows in motion))
+
+
 def run_identify(config: IdentifyConfig) -> None:
     """Identify the robot in a bag, and print what was found; or record one.
 
@@ -81,7 +87,7 @@ def run_identify(config: IdentifyConfig) -> None:
     if config.motion:
         record_motion(load_stack(config.stack, profile=config.profile), config.seed, config.bag)
         return
-    kept, rest = read_motion(config.bag).split(KEPT)
+    kept, rest = halves(read_motion(config.bag))
     found = identify(kept, config.weight)
     before, after = (tracking_error(x, t, rest) * 1e3 for x, t in ((NOMINAL, 0.0), (found.x, found.delay)))
     said = (

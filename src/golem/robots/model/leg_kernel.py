@@ -15,14 +15,13 @@ from golem.kernels import njit
 from golem.native import Record, Records, new_record
 from golem.robots.model.leg_kinematics import SOLE_CENTER
 from golem.robots.model.table import DOF, JOINTS, LINKS
-from golem.types import LEGS, Array
+from golem.types import Array
 
 if TYPE_CHECKING:
     import pinocchio as pin
 
 LEG = 6
 """Joints of one leg."""
-_JOINTS = LEGS.stop
 
 
 def tree_dtype(joints: int) -> np.dtype[Any]:
