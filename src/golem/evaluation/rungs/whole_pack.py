@@ -16,6 +16,7 @@ import numpy as np
 from golem.evaluation.base import DONE, Case, Outcomes, Results, TrialOutcome, TrialSpec
 from golem.evaluation.episodes.contacts import ContactWatch
 from golem.evaluation.episodes.episode import Episode, episode_seed
+from golem.evaluation.episodes.gantry_cell import GantryCell
 from golem.evaluation.episodes.oracle import Oracle, Whereabouts, whereabouts
 from golem.evaluation.episodes.pick_touches import PickTouches
 from golem.evaluation.metrics.text_table import TextTable
@@ -30,6 +31,7 @@ from golem.skills.job_file import Fate
 from golem.skills.kept_file import KeptFileConfig
 from golem.skills.pick_config import PickGoal
 from golem.slots import KEYS
+from golem.types import Array
 
 AWAY = 0.5
 """Distance behind the nominal stance at which the robot begins [m]."""
@@ -37,6 +39,8 @@ EDGE = 0.05
 """Fasteners this near to the near edge belong to it [m]."""
 HEAD = 0.006
 """Height of a head above its place [m]."""
+TIP = 0.03
+"""Height of a gantry's tip above the place whose fastener it loosens [m]."""
 LOOK = 0.2
 """Time between two looks at where the robot is [s]."""
 UNCLAIMED = "unclaimed"
@@ -65,6 +69,8 @@ class WholePackOptions:
     """whole: the gantry has been all round. edge: along the near edge only."""
     wrong: float = 0.05
     """Share of the fasteners of which the gantry says the wrong thing."""
+    gantry: bool = False
+    """Whether the gantry works beside the robot, a fastener in 20 s, and has not been there before."""
 
 
 class WholePackRung(VarStandRung):
@@ -92,7 +98,7 @@ class WholePackRung(VarStandRung):
         """Run one trial; see `Rung`."""
         stack = self._stack(spec.method, spec.profile, spec.overrides).with_options(
             "robot", layout=self.options.layout, conditions=dict(spec.case), stance=[AWAY, 0.0, 0.0],
-            world=self.options.world, obstacles=0, reach_y=REACH_Y,
+            world=self.options.world, obstacles=0, reach_y=REACH_Y, gantry=self.options.gantry,
         )  # fmt: skip
         folder = TemporaryDirectory()
         with folder, closing(Episode(stack, episode_seed(spec.seed, spec.index), self.onlooker)) as episode:
@@ -107,17 +113,23 @@ class WholePackRung(VarStandRung):
                 def look() -> bool:
                     nonlocal at, walked, due
                     touches()
+                    if gantry is not None and episode.t >= gantry.due:
+                        gantry(episode.t)
                     contacts(episode.t)
                     if episode.t >= due:
                         now, due = robot.truth.pose(), episode.t + LOOK
                         at, walked = now, walked + math.hypot(now.x - at.x, now.y - at.y)
                     return episode.result is not None
 
+                def wake() -> float:
+                    return min(touches.due(), contacts.due(), due, gantry.due if gantry else math.inf)
+
                 start = episode.t
-                episode.start(
-                    Disassemble(KeptFileConfig(folder.name)), DisassembleGoal(list="pack.csv", loosened="list")
-                )
-                episode.run(JOB, look, lambda: min(touches.due(), contacts.due(), due))
+                goal = DisassembleGoal(list="pack.csv", loosened="gantry" if self.options.gantry else "list")
+                visits = [(claim_name(slot), place_above(scene.layout, slot)) for slot, claimed in claims if claimed]
+                gantry = GantryCell(robot, episode.running.bus, visits, start) if self.options.gantry else None
+                episode.start(Disassemble(KeptFileConfig(folder.name)), goal)
+                episode.run(JOB, look, wake)
                 took, result, loss = episode.t - start, episode.result, episode.loss
                 episode.run(SETTLE)
                 found = result.value if result is not None and isinstance(result.value, DisassembleReport) else None
@@ -163,15 +175,25 @@ def write_claims(
     rows, claims, asked = list[str](), list[tuple[int, bool]](), asked_for(layout, options)
     for tray in layout.trays():
         x, y, z, _ = np.linalg.inv(layout.pose()) @ (tray.x, tray.y, tray.z, 1.0)
-        rows.append(f"tray,{x:.4f},{y:.4f},{z:.4f},")
+        rows.append(f"tray,{x:.4f},{y:.4f},{z:.4f},,")
     wrong = rng.random(len(layout.fasteners())) < options.wrong
     for slot, (x, y, z) in enumerate(layout.fasteners().tolist()):
         if slot not in layout.empty_holes or slot in loose:
             claimed = (slot in loose) != bool(wrong[slot]) and slot in asked
             claims.append((slot, claimed))
-            rows.append(f"{layout.kind(slot)},{x:.4f},{y:.4f},{z + HEAD:.4f},{int(claimed)}")
-    file.write_text("\n".join(["class,x,y,z,loose", *rows]), encoding="utf-8")
+            rows.append(f"{layout.kind(slot)},{x:.4f},{y:.4f},{z + HEAD:.4f},{int(claimed)},{claim_name(slot)}")
+    file.write_text("\n".join(["class,x,y,z,loose,name", *rows]), encoding="utf-8")
     return claims
+
+
+def claim_name(slot: int) -> str:
+    """Return what the gantry calls what is in a place."""
+    return f"Part_{slot}"
+
+
+def place_above(layout: PackLayout, slot: int) -> Array:
+    """Return (3,) where the tip of a gantry's tool loosens what is in a place, in the world [m]."""
+    return (layout.pose() @ (*layout.fasteners()[slot] + (0.0, 0.0, TIP), 1.0))[:3]
 
 
 def judged(claims: Sequence[tuple[int, bool]], fates: Sequence[Fate], found: Sequence[Whereabouts]) -> dict[str, float]:

@@ -67,6 +67,7 @@ class MujocoConfig:
         latency: delay of motor commands on top of the profile's [s].
         mjcf: the robot from this file instead of ours: the joints, motors, `imu` site and link names of the vendor's
             27-motor model, to which our hands are mounted. Its soles, torque limits and contacts are its own.
+        gantry: whether the tool of a gantry hangs above the pack, for a judge to move.
         tags: whether the hands wear their cuffs of tags, for a calibration.
     """
 
@@ -95,6 +96,7 @@ class MujocoConfig:
     payload: tuple[float, float] = (0.0, 0.0)
     latency: float = 0.0
     mjcf: Path | None = None
+    gantry: bool = False
     tags: bool = False
 
     def __post_init__(self) -> None:
@@ -126,8 +128,8 @@ class MujocoConfig:
         for name, value in self.conditions.items():
             check_condition(name, value)
         varied = self.layout != "nominal" and self.world not in KITCHENS
-        if self.world not in WITH_PACK and (self.conditions or varied):
-            raise ConfigError(f"The world '{self.world}' has no pack whose layout or conditions could differ.")
+        if self.world not in WITH_PACK and (self.conditions or varied or self.gantry):
+            raise ConfigError(f"The world '{self.world}' has no pack with layout, conditions or a gantry.")
         if (self.mirrored or self.sizes) and self.world != "counter":
             raise ConfigError(
                 f"Only a counter's things are mirrored or of other sizes, not those of the world '{self.world}'."

@@ -24,7 +24,7 @@ from golem.robots.worlds.fridge import Seal, seal_of
 from golem.robots.worlds.furnished import Person
 from golem.robots.worlds.ioniq5 import Ioniq5Layout
 from golem.robots.worlds.kitchen import KitchenLayout, add_kitchen, draw_counter, draw_kitchen, mirrored
-from golem.robots.worlds.layout import PackLayout
+from golem.robots.worlds.layout import GANTRY, PackLayout
 from golem.robots.worlds.pack import PackNames, add_pack
 from golem.robots.worlds.screws import ScrewDraw, draw_screws
 from golem.types import SIDES, Array, CameraInfo, PlanarPose
@@ -123,6 +123,8 @@ def _build(spec: mujoco.MjSpec, config: MujocoConfig, layout: PackLayout, profil
         names = add_pack(spec, layout, draws, stance=stance, workshop=config.world in WORKSHOPS)
         add_clutter(spec, layout, round(conditions.clutter), stream(seed, "world/clutter"))
         dress(spec, conditions, stance)
+        if config.gantry:
+            _add_gantry(spec, layout)
         _add_onlooker(spec, layout)
     elif config.world in KITCHENS:
         kitchen = lay_kitchen(config, seed, layout.top_z - PackLayout().top_z)
@@ -247,6 +249,15 @@ def _add_payload(hand: mujoco.MjsBody, mass: float) -> None:
         inertia=np.diag(held.inertia),
         explicitinertial=True,
     )
+
+
+def _add_gantry(spec: mujoco.MjSpec, layout: PackLayout) -> None:
+    """Add a gantry's tool, a spindle under its column, parked above the middle of the pack."""
+    x, y, z = (layout.pose() @ (0.5 * layout.size_x, 0.0, 1.0, 1.0))[:3]
+    body = spec.worldbody.add_body(name=GANTRY, mocap=True, pos=(x, y, z))
+    spindle, column = mujoco.mjtGeom.mjGEOM_CYLINDER, mujoco.mjtGeom.mjGEOM_BOX
+    body.add_geom(type=spindle, size=(0.02, 0.15, 0.0), pos=(0.0, 0.0, 0.15), rgba=(0.3, 0.3, 0.3, 1.0))
+    body.add_geom(type=column, size=(0.06, 0.06, 0.4), pos=(0.0, 0.0, 0.7), rgba=(0.9, 0.6, 0.1, 1.0))
 
 
 def _add_terrain(spec: mujoco.MjSpec, config: MujocoConfig, seed: int) -> tuple[Person, ...]:

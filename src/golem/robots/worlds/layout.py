@@ -18,6 +18,8 @@ FASTENERS_Y = 21
 HOLE_CELL = 0.007
 """Half side of the square that a bore or an empty hole takes out of the rim's collision and visual strips [m]."""
 
+GANTRY = "gantry_tool"
+"""Mocap body of the gantry's tool; its origin is the tool's tip."""
 
 Kind = Literal["screw", "nut", "bolt"]
 KINDS: tuple[Kind, ...] = ("screw", "nut", "bolt")
