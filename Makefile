@@ -6,7 +6,7 @@ export PYTHONDONTWRITEBYTECODE :=
 # Types are checked on one core while the kernels are compiled on the other.
 MAKEFLAGS += --jobs=2 --output-sync=line
 
-.PHONY: help demo test test-slow test-long kernels lint format docs lock venv venv-isaac clean
+.PHONY: help demo test test-slow test-long kernels lint format docs release lock venv venv-isaac clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' Makefile | sed -E 's/:.*## /\t/' | expand -t 12
@@ -39,6 +39,9 @@ format: venv-dev  ## rewrite the sources in the project's style
 
 docs: venv-docs  ## build the documentation into site/
 	$(BIN)/mkdocs build --strict
+
+release: venv-docs  ## wheel, sdist, docs, bill of materials and checksums of a tagged version into dist/
+	scripts/release.sh
 
 lock: venv-dev  ## resolve the requirements again (UPGRADE=--upgrade takes newer releases)
 	scripts/lock.sh $(UPGRADE)

@@ -234,7 +234,7 @@ def run(console: Console | None = None) -> int:
 
 
 def _reinstall_line() -> str:
-    return "make clean venv" if _CHECKOUT else "pip install --force-reinstall golem-humanoid"
+    return "make clean venv" if _CHECKOUT else "pip install --force-reinstall WHEEL"
 
 
 def _problem(program: str, environment: dict[str, str]) -> str:

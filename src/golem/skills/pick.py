@@ -141,7 +141,8 @@ class Pick:
         """Stand as low as the hands want it, where the legs take a height."""
         if len(drops := context.legs.drops) == 1:
             return
-        seen = await see_fasteners(context, goal.label, goal.container, floor_places("a pick", goal.avoid), True)
+        avoid, wanted = (floor_places("a pick", places) for places in (goal.avoid, goal.wanted))
+        seen = await see_fasteners(context, goal.label, goal.container, avoid, True, wanted)
         stance = stance_here(seen.places, seen.weights, seen.tray, drops)
         if stance.served and stance.drop:
             context.say("stand", f"Standing {100.0 * stance.drop:.0f} cm lower, where {stance.served} are in reach.")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import traceback
 from collections import Counter
 from collections.abc import Hashable, Mapping, Sequence
@@ -24,12 +25,20 @@ from golem.provenance import stack_facts
 from golem.stack import Stack, load_stack
 from golem.types import Twist
 
-POSTURES = ("hanging", "standing", "walking")
-"""What the robot does when a fault begins."""
+POSTURES: dict[str, dict[str, Any]] = {
+    "hanging": {},
+    "standing": {},
+    "walking": {},
+    "loaded": {"payload": [2.0, 2.0]},
+    "climbing": {"world": "slope", "slope": math.radians(8.0)},
+}
+"""What the robot does when a fault begins, and what differs in its world; loaded: it stands with 2 kg in each hand."""
+USUAL = ("hanging", "standing", "walking")
+"""Those that are tried unless others are named."""
 ARMED = 0.2
 """Time after which the gate is asked to let commands pass [s]."""
-SETTLED = {"hanging": 2.5, "standing": 3.5, "walking": 5.5}
-"""Time at which the fault begins [s]."""
+SETTLED = {"hanging": 2.5, "standing": 3.5, "walking": 5.5, "loaded": 3.5, "climbing": 11.5}
+"""Time at which the fault begins [s]; the ramp begins a metre ahead."""
 WALKS = Twist(0.3)
 """What a robot that walks is told, from `SETTLED["standing"]` on."""
 BATCH = 20
@@ -42,8 +51,8 @@ GATE = "gate"
 class FaultOptions:
     """Which faults, and when."""
 
-    posture: tuple[str, ...] = POSTURES
-    """What the robot does when they begin: hanging, standing, walking."""
+    posture: tuple[str, ...] = USUAL
+    """What the robot does when they begin: hanging, standing, walking, loaded (2 kg in each hand), climbing (8 deg)."""
     only: str = ""
     """Only faults whose name contains this."""
 
@@ -75,12 +84,12 @@ class FaultsRung(Rung[FaultOptions]):
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
         """Return what determines a trial; see `Rung`."""
-        return {posture: stack_facts(self.stack(posture, profile, overrides)) for posture in POSTURES}
+        return {posture: stack_facts(self.stack(posture, profile, overrides)) for posture in self.options.posture}
 
     def stack(self, posture: str, profile: str, overrides: Mapping[str, str]) -> Stack:
         """Return the stack of a robot in `posture`: one of the shipped, on an open floor."""
         name = "tether" if posture == "hanging" else "stand"
-        stack = load_stack(name, profile=profile).with_options("robot", world="open")
+        stack = load_stack(name, profile=profile).with_options("robot", **{"world": "open", **POSTURES[posture]})
         for slot, use in overrides.items():
             stack = stack.with_choice(slot, use)
         return stack
@@ -107,8 +116,9 @@ class FaultsRung(Rung[FaultOptions]):
         with closing(FaultRig(stack, episode_seed(spec.seed, spec.index))) as rig:
             rig.executor.run(ARMED)
             rig.activate()
-            rig.executor.run(SETTLED["standing"] if posture == "walking" else SETTLED[posture])
-            if posture == "walking":
+            walks = posture in ("walking", "climbing")
+            rig.executor.run(SETTLED["standing"] if walks else SETTLED[posture])
+            if walks:
                 rig.twist = WALKS
                 rig.executor.run(SETTLED[posture])
             if rig.status.state is not GateState.ACTIVE:
