@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from golem.capabilities.arms.diff_ik import DiffIK
-from golem.capabilities.arms.postures import posture
-from golem.capabilities.arms.solve import downward
+from golem.capabilities.arms.postures import downward, posture
 from golem.capabilities.collision.obstacles import Obstacle, World
 from golem.capabilities.memory.object_map import ObjectMap
 from golem.capabilities.planning.base import PlanRefused, Refusal

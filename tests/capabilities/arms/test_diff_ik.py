@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from golem.capabilities.arms.base import TargetError, UpperBody
 from golem.capabilities.arms.diff_ik import DiffIK
 from golem.capabilities.arms.line import Line
-from golem.capabilities.arms.postures import posture
-from golem.capabilities.arms.solve import downward
+from golem.capabilities.arms.postures import downward, posture
 from golem.capabilities.arms.task_space import NEAR, TaskSpaceConfig
 from golem.capabilities.collision.collision_model import CollisionModel
 from golem.capabilities.collision.sphere_robot import load_spheres

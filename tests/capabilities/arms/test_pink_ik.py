@@ -7,8 +7,7 @@ import pytest
 
 from golem.capabilities.arms.diff_ik import DiffIK
 from golem.capabilities.arms.pink_ik import PinkIK
-from golem.capabilities.arms.postures import posture
-from golem.capabilities.arms.solve import downward
+from golem.capabilities.arms.postures import downward, posture
 from golem.capabilities.arms.task_space import TaskSpaceConfig
 from golem.errors import MissingExtra
 from golem.types import NUM_JOINTS, UPPER

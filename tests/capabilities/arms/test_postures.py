@@ -2,11 +2,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests.capabilities.arms.solved_posture import solve_posture
 
 from golem.capabilities.arms.arm_kinematics import UpperKinematics
 from golem.capabilities.arms.base import TargetError
-from golem.capabilities.arms.postures import POSTURES, posture
-from golem.capabilities.arms.solve import downward, solve_posture
+from golem.capabilities.arms.postures import POSTURES, downward, posture
 from golem.errors import ConfigError
 from golem.robots.model.kinematics import Kinematics
 from golem.robots.sensors.cameras import CAMERAS

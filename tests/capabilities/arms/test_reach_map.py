@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from golem.capabilities.arms.goal_postures import GoalPostures
-from golem.capabilities.arms.postures import posture
+from golem.capabilities.arms.postures import downward, posture
 from golem.capabilities.arms.reach_map import ReachMap, load_map, save_map
-from golem.capabilities.arms.solve import downward
 from golem.capabilities.planning.joint_space import JointSpace, PlanningRobot
 from golem.errors import ConfigError
 

@@ -10,8 +10,7 @@ import pytest
 
 from golem.capabilities.arms.arm_kinematics import UpperKinematics
 from golem.capabilities.arms.goal_postures import GoalPostures
-from golem.capabilities.arms.postures import posture
-from golem.capabilities.arms.solve import downward
+from golem.capabilities.arms.postures import downward, posture
 from golem.capabilities.collision.obstacles import Obstacle, World, cloud_grid
 from golem.capabilities.planning.base import Held, Plan, PlanRefused, PlanRequest, Refusal
 from golem.capabilities.planning.hermite import interpolate

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.hardware.estimator.sensed_feet import Feet
 
 from golem.capabilities.legs.hold import STANCES
 from golem.errors import ConfigError
@@ -21,7 +22,7 @@ from golem.evaluation.rungs.base_estimation import (
     slipping,
     wrong_contacts,
 )
-from golem.hardware.estimator.feet import Feet, FeetConfig
+from golem.hardware.estimator.feet import FeetConfig
 from golem.hardware.estimator.random_walk import base_velocity
 from golem.robots.model.leg_dynamics import LegDynamics
 from golem.robots.model.spatial import rotation_rpy

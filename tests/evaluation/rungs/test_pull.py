@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from golem.capabilities.arms.solve import downward
+from golem.capabilities.arms.postures import downward
 from golem.evaluation.rungs.pick_screw import straightness
 from golem.types import Array
 

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.hardware.estimator.sensed_feet import Feet
 
 from golem.hardware.estimator.attitude import Attitude
-from golem.hardware.estimator.feet import Feet, FeetConfig
+from golem.hardware.estimator.feet import FeetConfig
 from golem.robots.model.imu_mount import TORSO, base_rate
 from golem.robots.model.leg_dynamics import LegDynamics
 from golem.types import LEGS, NUM_JOINTS, LowState

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from golem.middleware.wire import hg
-from golem.middleware.wire.crc import crc32
+from golem.middleware.wire.crc import REVERSED, crc32
 
 
 def bitwise(words: bytes) -> int:
@@ -20,11 +20,11 @@ def bitwise(words: bytes) -> int:
 @pytest.mark.parametrize("size", [0, 4, 8, 200])
 def test_it_is_the_crc_it_claims_to_be(size: int) -> None:
     words = np.random.default_rng(size).bytes(size)
-    assert crc32(words) == bitwise(words)
+    assert crc32(words.translate(REVERSED)) == bitwise(words)
 
 
 def test_the_check_value_is_that_of_crc_32_mpeg_2() -> None:
-    assert crc32(b"123456789") == 0x0376E6E7
+    assert crc32(b"123456789".translate(REVERSED)) == 0x0376E6E7
 
 
 def test_messages_of_the_sdks_defaults_have_its_checksums() -> None:

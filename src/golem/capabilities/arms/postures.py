@@ -1,4 +1,4 @@
-"""Named upper-body postures: where an arm waits, and where it starts to work."""
+"""Named upper-body postures: where an arm waits, and where it starts to work; and hands that point down."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from golem.types import Array
 
 _MIRROR = np.array([1.0, -1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
 # Right arm, motor order [rad], torso ahead, hand straight down, gripper's x axis towards -y (so that the fingers close
-# along x). Solved with `solve.solve_posture`; tests/capabilities/arms/test_postures.py solves them again.
+# along x). tests/capabilities/arms/test_postures.py solves them again.
 _HOME = np.array([-2.2676, -1.0230, -0.0531, 2.8722, -2.1033, -0.2992, 0.9781])
 _READY = np.array([-2.1677, -0.3555, -0.0472, 2.9261, -1.4805, -0.1529, 0.8282])
 
@@ -59,3 +59,16 @@ def mirror(q: Array) -> Array:
     out[ARM_COLUMNS["left"]] = _MIRROR * q[ARM_COLUMNS["right"]]
     out[ARM_COLUMNS["right"]] = _MIRROR * q[ARM_COLUMNS["left"]]
     return out
+
+
+def downward(x: float, y: float, z: float, heading: float) -> Array:
+    """Return the (4, 4) pose of a grasp frame that points straight down.
+
+    Args:
+        x: forward position of its origin in base_link [m].
+        y: its position to the left [m].
+        z: its height [m].
+        heading: direction of its x axis in the horizontal plane, from base_link's x axis [rad].
+    """
+    c, s = np.cos(heading), np.sin(heading)
+    return np.array([[c, s, 0.0, x], [s, -c, 0.0, y], [0.0, 0.0, -1.0, z], [0.0, 0.0, 0.0, 1.0]])

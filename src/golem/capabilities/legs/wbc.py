@@ -28,7 +28,7 @@ from golem.interfaces.payloads import LegCommand
 from golem.robots.model.imu_mount import sensed_base_rate
 from golem.robots.model.limits import load_limits
 from golem.robots.model.table import JOINT_NAMES
-from golem.types import GRAVITY, LEGS, Array, BaseEstimate, LowState
+from golem.types import LEGS, Array, BaseEstimate, LowState
 
 _SLIP = np.array([0.003, 0.003, 0.02])
 """How far the feet may be from their places relative to each other, x, y [m] and yaw [rad]; further on these move."""
@@ -98,37 +98,19 @@ class WbcReport:
     """Why the legs were told what they were told at one tick; vectors are in level axes.
 
     Attributes:
-        t: time of the state it answers [s].
         com_error: (3,) from the centre of mass to where it belongs [m]; the height is the pelvis'.
-        com_velocity: (3,) [m/s].
-        capture: (2,) capture point relative to the middle of the soles [m].
-        com_wish, com_given: (3,) acceleration of the centre of mass asked for, and what the forces give it [m/s^2].
-        turn_wish, turn_given: (3,) the same for the pelvis' angular acceleration, in its own axes [rad/s^2].
         forces: (2, 4, 3) on the corners of the left and the right sole [N].
         corners: (2, 4, 3) where these act, relative to base_link [m].
-        torque: (12,) of the leg motors [N m].
         at_limit: joints whose torque is at its bound.
-        lifting: (2, 4) corners that do not push: a foot is about to tip about the others.
         share: of these torques that is commanded, less than 1 until the feet are loaded.
-        iterations: of the solver.
         solved: False where the solver failed and the previous torque was kept.
     """
 
-    t: float
     com_error: Array
-    com_velocity: Array
-    capture: Array
-    com_wish: Array
-    com_given: Array
-    turn_wish: Array
-    turn_given: Array
     forces: Array
     corners: Array
-    torque: Array
     at_limit: tuple[str, ...]
-    lifting: Array
     share: float
-    iterations: int
     solved: bool
 
 
@@ -168,7 +150,7 @@ class Wbc:
         self._share = 0.0
         self._solution: Solution | None = None
         self._failures = 0
-        self._asked: tuple[float, Array, Array, Tasks] | None = None
+        self._asked: Array | None = None
 
     def reset(self, state: LowState) -> None:
         """Forget everything; the next tick takes posture, height and load of the feet from its measurements."""
@@ -208,7 +190,7 @@ class Wbc:
         self._solution = solution or self._solution
         if self._solution is None or self._failures > c.patience:
             raise StanceError(f"Wbc found no contact forces for {self._failures} ticks in a row.")
-        self._asked = state.t, middle, goal, tasks
+        self._asked = goal
         tau = self._share * (self._solution.torque + self._kd * dq)
         return LegCommand(hold.copy(), (1.0 - self._share) * self._kp, self._kd.copy(), tau)
 
@@ -217,30 +199,14 @@ class Wbc:
         """The report of the last tick, worked out when it is asked for; None before the first tick."""
         if self._asked is None or self._solution is None:
             return None
-        t, middle, goal, tasks = self._asked
         d, solution = self._dynamics, self._solution
-        forces = solution.forces
-        pendulum = math.sqrt(max(float(d.com[2] - middle[2]), 0.1) / GRAVITY)
-        given = forces.sum(axis=(0, 1)) / d.mass
-        given[2] -= GRAVITY
         full = np.abs(solution.torque) > self._bound - 1e-3
-        corners = d.soles[:, None] + np.einsum("fij,cj->fci", d.soles_R, self._program.corners)
         return WbcReport(
-            t=t,
-            com_error=goal - d.com,
-            com_velocity=d.com_velocity,
-            capture=(d.com - middle)[:2] + pendulum * d.com_velocity[:2],
-            com_wish=tasks.com,
-            com_given=given,
-            turn_wish=tasks.turn,
-            turn_given=solution.acceleration[3:6],
-            forces=forces,
-            corners=corners,
-            torque=solution.torque,
+            com_error=self._asked - d.com,
+            forces=solution.forces,
+            corners=d.soles[:, None] + np.einsum("fij,cj->fci", d.soles_R, self._program.corners),
             at_limit=tuple(JOINT_NAMES[i] for i in np.flatnonzero(full)),
-            lifting=np.einsum("fci,fi->fc", forces, d.soles_R[:, :, 2]) < 1e-3,
             share=self._share,
-            iterations=solution.iterations,
             solved=self._failures == 0,
         )
 

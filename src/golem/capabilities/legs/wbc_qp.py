@@ -159,13 +159,11 @@ class Solution:
         acceleration: (18,) of base and legs.
         forces: (2, 4, 3) at the corners of the left and the right sole, in level axes [N].
         torque: (12,) of the leg motors [N m].
-        iterations: of the solver.
     """
 
     acceleration: Array
     forces: Array
     torque: Array
-    iterations: int
 
 
 class StanceProgram:
@@ -236,10 +234,10 @@ class StanceProgram:
         H[self._diagonal] += w.force
         self._lower[_SIZE:] = -self._torque - k
         self._upper[_SIZE:] = self._torque - k
-        x, _, flag, info = daqp.solve(H, -(b @ A), K, self._upper, self._lower, self._sense)
+        x, _, flag, _ = daqp.solve(H, -(b @ A), K, self._upper, self._lower, self._sense)
         if flag <= 0:
             return None
         rays = x[:_RAYS].reshape(2, _CORNERS, _EDGES)
         edges = self._force[:, :_EDGES]
         forces = np.einsum("fij,jk,fck->fci", dynamics.soles_R, edges, rays)
-        return Solution(T @ x + t, forces, K @ x + k, int(info["iterations"]))
+        return Solution(T @ x + t, forces, K @ x + k)

@@ -11,8 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from golem.capabilities.arms.goal_postures import GoalPostures
-from golem.capabilities.arms.postures import posture
-from golem.capabilities.arms.solve import downward
+from golem.capabilities.arms.postures import downward, posture
 from golem.capabilities.arms.trajectory import gate_limits
 from golem.capabilities.collision.link_poses import joint_names
 from golem.capabilities.collision.mesh_oracle import MeshOracle

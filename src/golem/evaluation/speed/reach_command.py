@@ -14,9 +14,8 @@ from rich.table import Table
 
 from golem.capabilities.arms.base import ARM_COLUMNS
 from golem.capabilities.arms.goal_postures import GoalPostures
-from golem.capabilities.arms.postures import posture
+from golem.capabilities.arms.postures import downward, posture
 from golem.capabilities.arms.reach_map import ReachMap, save_map
-from golem.capabilities.arms.solve import downward
 from golem.capabilities.planning.joint_space import JointSpace, PlanningRobot
 from golem.errors import ConfigError
 from golem.figures import blank_figure, pixels

@@ -10,11 +10,11 @@ from golem.hardware.estimator.contact import ContactConfig
 from golem.hardware.estimator.feet_kernel import contact, loads, pressed
 from golem.hardware.estimator.foot_force import FOOT_FORCE, FootForceConfig, foot_wrenches
 from golem.kernels import njit
-from golem.native import Record, Records, new_record
+from golem.native import Record, Records
 from golem.robots.model.leg_dynamics import leg_tree
 from golem.robots.model.leg_kernel import LEG_MOTION, leg_motion, tree_dtype
 from golem.robots.model.table import SOLE
-from golem.types import GRAVITY, LEGS, Array, LowState
+from golem.types import GRAVITY, LEGS, Array
 
 _HALF: Array = 0.5 * np.array([SOLE.x[1] - SOLE.x[0], SOLE.y[1] - SOLE.y[0]])
 """(2,) half length and half width of a sole [m]."""
@@ -26,7 +26,7 @@ its legs, and the leg of the lower foot then feels no load."""
 
 @dataclass(frozen=True, slots=True)
 class FeetConfig:
-    """Options of `Feet`.
+    """Options of `sense_feet`.
 
     Attributes:
         force: how forces come from torques.
@@ -64,7 +64,13 @@ FEET = np.dtype(
         ("local", "f8", (2, 3)),
     ]
 )
-"""Options, memory and answers of `sense_feet`; of the answers see `Feet`."""
+"""Options, memory and answers of `sense_feet`, in the axes of base_link.
+
+Of each foot: `force`, the vertical force of the ground [N]; `contact`, the probability that it carries load; `weight`,
+how far it is to be believed to stand still; `points`, where it presses on the ground [m]: heel and toe of a foot that
+rolls do not; `rates`, the velocity of the sole there relative to base_link [m/s]; `local`, that place from the middle
+of the sole, in the axes of the foot [m].
+"""
 
 
 def put_feet(memory: Records, config: FeetConfig, tree: Records | None = None) -> None:
@@ -84,7 +90,17 @@ def forget_feet(memory: Records) -> None:
 
 @njit(cache=True, nogil=True)
 def sense_feet(m: Record, q: Array, dq: Array, tau: Array, up: Array, omega: Array, dt: float) -> None:
-    """Take one sample; arguments as for `Feet.step`, `m` is a `FEET`."""
+    """Take one sample into `m`, a `FEET`.
+
+    Args:
+        m: of one robot.
+        q: joints [rad].
+        dq: their velocities [rad/s].
+        tau: their torques [N m].
+        up: (3,) the vertical in base_link.
+        omega: (3,) angular rate of base_link, in base_link [rad/s].
+        dt: time since the previous sample [s].
+    """
     gravity = np.empty(3)
     for a in range(3):
         gravity[a] = -GRAVITY * up[a]
@@ -138,57 +154,3 @@ def level_floor(m: Record, velocity: float, up: Array, feet: Record, dt: float) 
         m.seen, m.floor = 1, m.z - height
     m.z += dt / (LAG + dt) * (m.floor + height - m.z)
     return height
-
-
-class Feet:
-    """Both feet of one robot, axes of base_link.
-
-    The point of a foot that stands still is where it presses on the ground: heel and toe of a foot that rolls do not.
-    """
-
-    def __init__(self, config: FeetConfig) -> None:
-        """Start with nothing known."""
-        memory = new_record(FEET)
-        put_feet(memory, config)
-        self._memory = memory[0]
-
-    def step(self, state: LowState, up: Array, omega: Array, dt: float) -> None:
-        """Take one sample.
-
-        Args:
-            state: joints and torques.
-            up: (3,) the vertical in base_link.
-            omega: (3,) angular rate of base_link, in base_link [rad/s].
-            dt: time since the previous sample [s].
-        """
-        sense_feet(self._memory, state.q, state.dq, state.tau, up, omega, dt)
-
-    @property
-    def force(self) -> Array:
-        """(2,) vertical force of the ground [N]."""
-        return self._memory["force"].copy()
-
-    @property
-    def contact(self) -> Array:
-        """(2,) probability that each foot carries load."""
-        return self._memory["contact"].copy()
-
-    @property
-    def weight(self) -> Array:
-        """(2,) how far each is to be believed to stand still."""
-        return self._memory["weight"].copy()
-
-    @property
-    def points(self) -> Array:
-        """(2, 3) centre of pressure [m]."""
-        return self._memory["points"].copy()
-
-    @property
-    def rates(self) -> Array:
-        """(2, 3) velocity of the sole there, relative to base_link [m/s]."""
-        return self._memory["rates"].copy()
-
-    @property
-    def local(self) -> Array:
-        """(2, 3) centre of pressure from the middle of the sole, axes of the foot [m]."""
-        return self._memory["local"].copy()

@@ -23,7 +23,6 @@ from golem.middleware.dds.base import DdsError
 SERIES = "11.0"
 """The releases of cyclonedds whose structs are laid out as below."""
 
-BAD_PARAMETER = -3
 PRECONDITION_NOT_MET = -4
 ALREADY_DELETED = -9
 TIMEOUT = -10

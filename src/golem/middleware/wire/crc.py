@@ -13,13 +13,9 @@ from array import array
 
 from golem.middleware.dds.base import ENCAPSULATION, Payload
 
-_REVERSED = bytes(int(f"{byte:08b}"[::-1], 2) for byte in range(256))
+REVERSED = bytes(int(f"{byte:08b}"[::-1], 2) for byte in range(256))
+"""Every byte with its bits reversed."""
 _WORD = 4
-
-
-def crc32(words: bytes) -> int:
-    """Return the checksum of 32-bit words given as big-endian bytes."""
-    return _crc32(words.translate(_REVERSED))
 
 
 class Checksum:
@@ -47,14 +43,14 @@ class Checksum:
 
     def of(self, payload: Payload) -> int:
         """Return the checksum that `payload`, of the right length, should carry."""
-        body = bytearray(bytes(payload[len(ENCAPSULATION) : -_WORD]).translate(_REVERSED))
+        body = bytearray(bytes(payload[len(ENCAPSULATION) : -_WORD]).translate(REVERSED))
         for where, zeros in self._padding:
             body[where] = zeros
         split = self._split
         body[split : split + 4] = b"%b\0\0%b\0\0\0" % (body[split : split + 2], body[split + 2 : split + 3])
         words = array("I", bytes(body))
         words.byteswap()
-        return _crc32(words)
+        return crc32(words)
 
     def seal(self, payload: bytearray) -> None:
         """Write the checksum of `payload` into it."""
@@ -65,7 +61,7 @@ class Checksum:
         return int.from_bytes(payload[-_WORD:], "little") == self.of(payload)
 
 
-def _crc32(reversed_words: bytes | array[int]) -> int:
+def crc32(reversed_words: bytes | array[int]) -> int:
     """Return the checksum of 32-bit words given as big-endian bytes with the bits of each reversed."""
     crc = zlib.crc32(reversed_words) ^ 0xFFFFFFFF
-    return int.from_bytes(crc.to_bytes(4, "little").translate(_REVERSED), "big")
+    return int.from_bytes(crc.to_bytes(4, "little").translate(REVERSED), "big")

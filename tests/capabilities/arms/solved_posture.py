@@ -1,4 +1,4 @@
-"""Inverse kinematics from many starts, for postures that are chosen once and offline."""
+"""Inverse kinematics from many starts: how the named postures were chosen."""
 
 from __future__ import annotations
 
@@ -85,16 +85,3 @@ def comfort(ik: DiffIK, sides: list[Side], q: Array) -> float:
         scores.append(ik.kinematics.margin(side, q) / 0.25)
         scores.append(ik.kinematics.manipulability(side, q) / 0.12)
     return min(scores)
-
-
-def downward(x: float, y: float, z: float, heading: float) -> Array:
-    """Return the (4, 4) pose of a grasp frame that points straight down.
-
-    Args:
-        x: forward position of its origin in base_link [m].
-        y: its position to the left [m].
-        z: its height [m].
-        heading: direction of its x axis in the horizontal plane, from base_link's x axis [rad].
-    """
-    c, s = np.cos(heading), np.sin(heading)
-    return np.array([[c, s, 0.0, x], [s, -c, 0.0, y], [0.0, 0.0, -1.0, z], [0.0, 0.0, 0.0, 1.0]])
