@@ -19,8 +19,7 @@ import yaml
 from golem.capabilities.identification import regressor as r
 from golem.capabilities.identification.fit import Identified, identify
 from golem.capabilities.identification.recording import read_motion
-from golem.evaluation.identification.identify_command import halves, record_motion
-from golem.evaluation.identification.outcome import save, tracking_error
+from golem.evaluation.identification.identify_command import halves, record_motion, save, tracking_error
 from golem.robots.model.table import JOINT_NAMES
 from golem.stack import load_stack
 from golem.types import NUM_JOINTS, TICK

@@ -10,8 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from golem import registry
-from golem.capabilities.legs.foot_separation import FootSeparationConfig
-from golem.capabilities.legs.locomotion import LocomotionConfig
+from golem.capabilities.legs.locomotion import FootSeparationConfig, LocomotionConfig
 from golem.errors import ConfigError
 from golem.interfaces.unitree_api import LOCO_APIS
 from golem.runtime.onboard_nodes import stack_loco_api

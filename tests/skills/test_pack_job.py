@@ -23,9 +23,8 @@ from golem.robots.model.kinematics import Kinematics
 from golem.skills.context import Context
 from golem.skills.disassemble_goal import DisassembleGoal
 from golem.skills.fastener_list import read_list
-from golem.skills.frame_fit import fit_frames, matched
-from golem.skills.gantry import KEEP_OFF, SILENT, Gantry
 from golem.skills.job_file import Fate, JobFault, JobFile
+from golem.skills.pack_job import KEEP_OFF, SILENT, Gantry, fit_frames, matched
 from golem.skills.pick_report import PickReport
 from golem.types import PlanarPose
 

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import math
+import re
+from collections.abc import Collection
 
 import cv2
 import numpy as np
 
 from golem.capabilities.navigation.goto import GoTo
 from golem.interfaces import topics
+from golem.middleware.bus import News
 from golem.skills.approach import APPROACH, approach
 from golem.skills.base import FAULT, REFUSED, SkillResult, StageFailed
 from golem.skills.context import Context
 from golem.skills.disassemble_goal import DisassembleGoal, DisassembleReport
 from golem.skills.dock import DockGoal, DockReport
 from golem.skills.fastener_list import KINDS
-from golem.skills.frame_fit import fit_frames, matched
-from golem.skills.gantry import KEEP_OFF, Gantry
 from golem.skills.job_file import TO_DO, Fate, JobFile, PackFastener
 from golem.skills.navigate import NavigateGoal
 from golem.skills.pack_plan import PackSides, PackStop, make_plan
@@ -25,6 +26,69 @@ from golem.skills.pick_config import PickGoal
 from golem.skills.pick_report import PickOutcome, PickReport, Sight, Tried
 from golem.skills.pick_targets import WANTED
 from golem.types import Array, PlanarPose, Side
+
+SENTENCE = re.compile(r"\s*Remove: (\S{1,60}) with confidence = (\S{1,20})\s*")
+"""On the topic `/triggered_behavior`."""
+KEEP_OFF = 0.9
+"""Distance from where the gantry works at which nobody stands or reaches [m] [own]."""
+SILENT = 90.0
+"""Time without a word after which no more is waited for [s]; a removal takes RAPID 20 s."""
+
+
+class Gantry:
+    """Listens at every tick.
+
+    Attributes:
+        at: name of the fastener it is at, where it stays until it says another one; empty before its first word.
+        loosened: names of those it is done with.
+        t: time of its last word [s], first that of the beginning.
+    """
+
+    def __init__(self, context: Context, names: Collection[str]) -> None:
+        """Hear what comes from now on, in the stack of `context`, of the fasteners called `names`."""
+        self._context, self._names, self._news = context, names, News(context.bus, topics.REMOVALS)
+        self.at, self.loosened, self.t = "", set[str](), context.t
+
+    def __call__(self) -> None:
+        """Listen."""
+        said = SENTENCE.fullmatch((self._news.read() or "")[:100])
+        if said is not None and said[1] in self._names:
+            self.loosened |= {self.at} - {said[1], ""}
+            self.at, self.t = said[1], self._context.t
+
+    @property
+    def silent(self) -> bool:
+        """Whether nothing more is to be expected of it."""
+        return self._context.t - self.t > SILENT
+
+
+def fit_frames(a: Array, b: Array) -> tuple[PlanarPose, float]:
+    """Return where the frame of `a` is in that of `b`, and the RMS distance that is left [m].
+
+    Least squares over turn and shift, as Kabsch (Acta Cryst. A32, 1976), for frames whose z axes are parallel.
+
+    Args:
+        a: (n, 2) places, n >= 1; of one alone follows no turn [m].
+        b: (n, 2) the same in the other frame [m].
+    """
+    mid_a, mid_b = a.mean(axis=0), b.mean(axis=0)
+    p, q = a - mid_a, b - mid_b
+    turn = math.atan2(float(np.sum(p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0])), float(np.sum(p * q)))
+    R = PlanarPose(0.0, 0.0, turn).matrix()[:2, :2]
+    left = a @ R.T + (mid_b - R @ mid_a) - b
+    x, y = (mid_b - R @ mid_a).tolist()
+    return PlanarPose(x, y, turn), float(np.sqrt(np.mean(np.sum(left**2, axis=1))))
+
+
+def matched(known: Array, seen: Array, within: float) -> tuple[Array, Array]:
+    """Return the pairs (k, 2), (k, 2) of `known` (n, 2) and `seen` (m, 2) places that are nearest to each other."""
+    if not len(known) or not len(seen):
+        return np.zeros((0, 2)), np.zeros((0, 2))
+    away = np.linalg.norm(known[:, None] - seen[None], axis=2)
+    mine, other = away.argmin(axis=0), away.argmin(axis=1)
+    good = [k for k in range(len(seen)) if other[mine[k]] == k and away[mine[k], k] < within]
+    return known[mine[good]], seen[good]
+
 
 ORDER = ("near", "left", "far", "right")
 """Sides of a pack, as in `PackSides`."""

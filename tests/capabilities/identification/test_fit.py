@@ -9,7 +9,7 @@ from golem.capabilities.identification import regressor as r
 from golem.capabilities.identification.fit import find_delay, identify
 from golem.capabilities.identification.recording import IdentificationError, RecordedMotion
 from golem.capabilities.identification.sweep import MIDDLE, swing
-from golem.evaluation.identification.outcome import simulate
+from golem.evaluation.identification.identify_command import simulate
 from golem.hardware.servo.gains import default_gains
 from golem.robots.model.imu_mount import TORSO
 from golem.robots.model.limits import load_limits

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from tests.capabilities.legs.recorder import Recorder, crouching, still
 
-from golem.capabilities.legs.foot_separation import FootSeparation, FootSeparationConfig
-from golem.capabilities.legs.locomotion import Locomotion, LocomotionConfig
+from golem.capabilities.legs.locomotion import FootSeparation, FootSeparationConfig, Locomotion, LocomotionConfig
 from golem.interfaces.payloads import LegCommand
 from golem.robots.model.leg_dynamics import LegDynamics
 from golem.types import LEGS, SIDES, Array, LowState, Twist

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from golem.capabilities.legs.mpc.cost import CostConfig, cost
+from golem.capabilities.legs.mpc.controller import CostConfig, cost
 from golem.capabilities.legs.mpc.planning_model import Stance, Trajectories
 from golem.robots.model.spatial import rotation_rpy
 from golem.types import Array

@@ -7,10 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from golem.evaluation.conformance import cpu_limit
 from golem.evaluation.conformance.base import FAILED, SKIPPED, Check
 from golem.evaluation.conformance.check_command import CheckConfig, run_check
-from golem.evaluation.conformance.examine import candidate, examine
+from golem.evaluation.conformance.examine import candidate, cpu_limit, examine
 
 ENDLESS = """
 class Mine:
@@ -49,7 +48,7 @@ def test_another_thread_has_no_limit(monkeypatch: pytest.MonkeyPatch) -> None:
     done: list[int] = []
 
     def work() -> None:
-        with cpu_limit.cpu_limit():
+        with cpu_limit():
             done.append(sum(range(1000)))
 
     thread = threading.Thread(target=work)

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from golem.errors import ConfigError
-from golem.evaluation.metrics.coco import LabelledImage, score_label
-from golem.evaluation.metrics.coco_folder import read_coco
+from golem.evaluation.metrics.coco import LabelledImage, read_coco, score_label
 from golem.evaluation.speed.localizer_bench import LocalizerBenchConfig, run_localizer_bench
 from golem.types import Array, Detection
 

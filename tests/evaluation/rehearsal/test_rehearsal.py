@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from golem.evaluation.rehearsal.miswired_twin import FAULTS, FLIPPED, SWAPPED, reported
+from golem.evaluation.rehearsal.rehearse import FAULTS, FLIPPED, SWAPPED, reported
 from golem.runtime.bringup.bringup_command import CHECKS
 from golem.types import NUM_JOINTS
 

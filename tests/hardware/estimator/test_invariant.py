@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
-from golem.hardware.estimator.invariant import InvariantConfig, InvariantFilter
+from golem.hardware.estimator.invariant_ekf import InvariantConfig, InvariantFilter
 from golem.hardware.estimator.invariant_kernel import correct, exp_and_jacobian
 from golem.robots.model.spatial import skew
 from golem.types import Array

@@ -14,7 +14,6 @@ from rosbags.typesys import Stores, get_typestore
 from golem.errors import ConfigError
 from golem.middleware.dds.base import LATCHED, Participant, Sample
 from golem.middleware.dds.local import LocalDomain
-from golem.middleware.ros import parameters
 from golem.middleware.ros.codec import dds_name, type_hash
 from golem.middleware.ros.graph import INFO, PARTICIPANT_USER_DATA
 from golem.middleware.ros.node import RosNode
@@ -57,7 +56,7 @@ def test_a_node_is_announced_in_the_layout_of_its_peers(distro: str, store: Stor
     assert (entry.node_namespace, entry.node_name) == ("/robot", "twin")
     assert list(entry.writer_gid_seq[-1].data) == gid(publisher.writer.guid, size)
     assert list(entry.reader_gid_seq[-1].data) == gid(subscription.inbox.guid, size)
-    assert len(entry.writer_gid_seq) == len(entry.reader_gid_seq) == 1 + len(parameters.SERVICES)
+    assert len(entry.writer_gid_seq) == len(entry.reader_gid_seq) == 1 + len(node.SERVICES)
     assert bytes(types.serialize_cdr(info, INFO)) == bytes(sample.payload)[: len(types.serialize_cdr(info, INFO))]
 
 
@@ -75,7 +74,7 @@ def test_what_is_closed_is_announced_no_more() -> None:
         (entry,) = info.node_entities_info_seq
         return len(entry.reader_gid_seq), len(entry.writer_gid_seq)
 
-    own = len(parameters.SERVICES)
+    own = len(node.SERVICES)
     assert endpoints() == (own + 3, own + 5)
     server.close()
     assert endpoints() == (own, own)

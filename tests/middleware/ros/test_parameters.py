@@ -10,8 +10,7 @@ pytest.importorskip("rosbags")
 
 from golem.middleware.dds.local import LocalDomain
 from golem.middleware.ros.msgs import rcl_interfaces as rcl
-from golem.middleware.ros.node import RosNode
-from golem.middleware.ros.parameters import SERVICES
+from golem.middleware.ros.node import SERVICES, RosNode
 
 
 def ask(service: str, request: Any) -> Any:

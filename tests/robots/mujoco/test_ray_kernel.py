@@ -8,8 +8,7 @@ import pytest
 
 from golem.robots.mujoco.config import MujocoConfig, World
 from golem.robots.mujoco.engine import MujocoRobot
-from golem.robots.mujoco.lidar_sensor import seen_shapes, visible
-from golem.robots.mujoco.quaternion_kernel import matrix, turn, turned
+from golem.robots.mujoco.lidar_sensor import matrix, seen_shapes, turn, turned, visible
 from golem.robots.mujoco.ray_kernel import cast
 from golem.runtime.lockstep import start_posture
 

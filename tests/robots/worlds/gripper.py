@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import mujoco
 import numpy as np
 
-from golem.robots.worlds import nuts, screws
+from golem.robots.worlds import pack_part, screws
 from golem.robots.worlds.pack import set_contact_options
 from golem.robots.worlds.screws import ScrewDraw
 
@@ -56,8 +56,8 @@ def build(draw: ScrewDraw) -> mujoco.MjModel:
     for name in ("zinc", "steel"):
         spec.add_material(name=name)
     plate = spec.worldbody.add_body(name="plate")
-    (nuts.add_stud if draw.kind == "nut" else screws.add_bore)(plate, draw, (0, 0, 0))
-    (nuts.add_nut if draw.kind == "nut" else screws.add_screw)(spec, draw, (0, 0, 0), np.eye(4))
+    (pack_part.add_stud if draw.kind == "nut" else screws.add_bore)(plate, draw, (0, 0, 0))
+    (pack_part.add_nut if draw.kind == "nut" else screws.add_screw)(spec, draw, (0, 0, 0), np.eye(4))
     height = draw.protrusion + draw.head_height / 2
     spec.worldbody.add_body(name="anchor", mocap=True, pos=[0, 0, height])
     hand = spec.worldbody.add_body(name="hand", pos=[0, 0, height], gravcomp=1)

@@ -16,7 +16,7 @@ from golem.middleware.dds.base import Qos
 from golem.middleware.dds.local import LocalDomain, LocalParticipant
 from golem.middleware.ros import names
 from golem.middleware.ros.codec import action, dds_name, service
-from golem.middleware.ros.parameters import SERVICES
+from golem.middleware.ros.node import SERVICES
 from golem.runtime.live.stack_process import SHOWN
 from golem.stack import Choice, Stack
 from golem.types import TICK

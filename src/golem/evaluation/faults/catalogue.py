@@ -2,14 +2,252 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from itertools import chain
+from typing import Any
 
-from golem.evaluation.faults.class_faults import class_faults
-from golem.evaluation.faults.combined_faults import combined_faults
-from golem.evaluation.faults.command_faults import command_faults
+import numpy as np
+
+from golem.evaluation.faults.class_faults import KNEE, LYING, by_imu, class_faults, scaled, turned
+from golem.evaluation.faults.command_faults import JOINTS, LIMITS, command_faults
 from golem.evaluation.faults.data_faults import data_faults
-from golem.evaluation.faults.device_faults import device_faults
-from golem.evaluation.faults.injection import Injection
+from golem.evaluation.faults.injection import Expect, FaultMoment, FaultSource, Frames, Injection, by_command, by_state
+from golem.interfaces.payloads import Reason
+from golem.middleware.wire.convert import encode_low_command
+from golem.robots.model.table import JOINT_INDEX
+from golem.types import NUM_JOINTS, LowCommand, LowState
+
+
+def combined_faults() -> Iterator[Injection]:
+    """Yield every one of them."""
+    yield from _two_at_once()
+    yield from _while_stopped()
+
+
+def _error(m: FaultMoment, image: Any) -> None:
+    image["motor"]["motorstate"][KNEE] = 1
+
+
+def _hot(m: FaultMoment, image: Any) -> None:
+    image["motor"]["temperature"][KNEE] = 180
+
+
+def _off(m: FaultMoment, image: Any) -> None:
+    image["motor"]["mode"][KNEE] = 0
+
+
+HARD: dict[str, tuple[tuple[Reason, ...], dict[str, Any]]] = {
+    "a knee reports an error": ((Reason.MOTOR,), {"state": by_state(_error)}),
+    "a knee at 180 degrees": ((Reason.MOTOR_HOT,), {"state": by_state(_hot)}),
+    "a knee says it is off": ((Reason.MOTOR_MODE,), {"state": by_state(_off)}),
+    "no state": ((Reason.STATE_STALE,), {"state": lambda m, p: []}),
+    "truncated states": ((Reason.STATE_DAMAGED,), {"state": lambda m, p: [p[:-8]]}),
+    "IMU upside down": (
+        (Reason.IMU_IMPLAUSIBLE, Reason.TILT),
+        {"senses": by_imu(lambda m, u: replace(u, quat=turned(0, np.pi, u.quat)))},
+    ),
+}
+"""Faults after which nobody stands, and their reasons."""
+
+
+def _unstamped(m: FaultMoment, image: Any) -> None:
+    image["reserve"][0] = 0
+
+
+def _second(m: FaultMoment, rig: Any) -> None:
+    if "writer" not in m.kept:
+        m.kept["writer"] = rig.writer("/safety/lowcmd_in")
+
+
+SOFT: dict[str, dict[str, Any]] = {
+    "second writer": {"gate": _second},
+    "no stamp": {"command": by_command(_unstamped)},
+    "no command": {"command": lambda m, p: []},
+    "damaged commands": {"command": lambda m, p: [p[:-8]]},
+}
+"""Faults that leave legs and state sound."""
+
+
+def _two_at_once() -> Iterator[Injection]:
+    for hard, (reasons, one) in HARD.items():
+        for soft, other in SOFT.items():
+            yield Injection(f"{hard} and {soft}", FaultSource.DEVICE, Expect.STOP1, reasons, 0.25, **one, **other)
+
+
+def _while_stopped() -> Iterator[Injection]:
+    """The stack is silent from the begin on; a second later something else goes wrong."""
+
+    def later(spoil: Callable[..., Any], sound: Callable[..., Any]) -> Callable[..., Any]:
+        return lambda m, *what: (spoil if m.t > 1.0 else sound)(m, *what)
+
+    for hard, (reasons, one) in HARD.items():
+        sound: dict[str, Any] = {"state": lambda m, p: [p], "senses": lambda m, s: s}
+        late: dict[str, Any] = {key: later(spoil, sound[key]) for key, spoil in one.items()}
+        yield Injection(
+            f"{hard} while stopped", FaultSource.DEVICE, Expect.STOP1, reasons, 1.25, command=lambda m, p: [], **late
+        )
+
+    def dead(m: FaultMoment, c: LowCommand) -> LowCommand:
+        gain = np.where((np.arange(NUM_JOINTS) == KNEE) & (m.t > 1.0), 0.0, 1.0)
+        return replace(c, kp=c.kp * gain, kd=c.kd * gain, tau=c.tau * gain)
+
+    def spike(m: FaultMoment, s: LowState) -> LowState:
+        q = s.q.copy()
+        q[KNEE] += 0.5 * (m.k % 60 == 0 and m.t > 1.0)
+        return replace(s, q=q)
+
+    silent: dict[str, Any] = {"command": lambda m, p: [], "lasting": 3.0}
+    stale = (Reason.COMMAND_STALE,)
+    yield Injection(
+        "a knee without torque while stopped", FaultSource.DEVICE, Expect.SAFE, (*stale, *LYING), motors=dead, **silent
+    )
+    yield Injection(
+        "a knee jumps in 1 of 60 states while stopped",
+        FaultSource.DEVICE,
+        Expect.SAFE,
+        stale,
+        stands=True,
+        senses=spike,
+        **silent,
+    )
+
+    def again(m: FaultMoment, rig: Any) -> None:
+        if m.k % 10 == 0:
+            rig.reset()
+        if m.k % 10 == 5:
+            rig.activate()
+
+    def limp(m: FaultMoment, payload: bytes) -> Frames:
+        edit = scaled(("kp", "kd", "tau"), slice(0, NUM_JOINTS), lambda m: 0.0, None)
+        return [] if m.t < 0.25 else by_command(edit)(m, payload)
+
+    yield Injection(
+        "reset and activation for limp commands",
+        FaultSource.COMMAND,
+        Expect.SAFE,
+        stale,
+        stands=True,
+        lasting=3.0,
+        command=limp,
+        gate=again,
+    )
+    yield Injection(
+        "reset and activation at 50 Hz while it falls",
+        FaultSource.DEVICE,
+        Expect.STOP1,
+        (Reason.MOTOR,),
+        0.25,
+        lasting=1.2,
+        state=by_state(lambda m, image: _error(m, image) if m.t < 0.1 else None),
+        gate=again,
+    )
+
+
+def device_faults() -> Iterator[Injection]:
+    """Yield every fault of devices and processes."""
+    yield from _motors()
+    yield from _estop()
+    yield from _writers()
+    yield from _gate()
+
+
+def _stop(name: str, reasons: tuple[Reason, ...], within: float = 0.006, **more: Any) -> Injection:
+    return Injection(name, FaultSource.DEVICE, Expect.STOP, reasons, within, **more)
+
+
+def _motors() -> Iterator[Injection]:
+    for joint in JOINTS:
+        i = JOINT_INDEX[joint]
+
+        def dead(m: FaultMoment, command: LowCommand, i: int = i) -> LowCommand:
+            arrays = {name: getattr(command, name).copy() for name in ("tau", "kp", "kd")}
+            for array in arrays.values():
+                array[i] = 0.0
+            return replace(command, **arrays)
+
+        yield Injection(
+            f"{joint} without torque",
+            FaultSource.DEVICE,
+            Expect.SAFE,
+            (Reason.MOTOR_DEAD, *LIMITS),
+            motors=dead,
+            stands=i >= 13,
+        )
+
+    def changed(m: FaultMoment, rig: Any) -> None:
+        rig.machine = 7
+
+    yield _stop("mode_machine changes", (Reason.MOTOR_MODE,), 0.004, gate=changed)
+
+
+def _estop() -> Iterator[Injection]:
+    def press(m: FaultMoment, rig: Any) -> None:
+        rig.estop.pressed = True
+
+    def silent(m: FaultMoment, rig: Any) -> None:
+        rig.estop.period = 1e9
+        rig.estop._due = 1e12
+
+    def repeats(m: FaultMoment, rig: Any) -> None:
+        rig.estop._sequence = m.kept.setdefault("sequence", rig.estop._sequence)
+
+    yield _stop("e-stop pressed", (Reason.ESTOP_PRESSED,), 0.012, gate=press)
+    yield _stop("e-stop silent", (Reason.ESTOP_STALE,), 0.062, gate=silent)
+    yield _stop("e-stop repeats its sequence", (Reason.ESTOP_STALE,), 0.062, gate=repeats)
+
+
+def _writers() -> Iterator[Injection]:
+    for topic in ("/safety/lowcmd_in", "/lowcmd", "/lowstate"):
+
+        def second(m: FaultMoment, rig: Any, topic: str = topic) -> None:
+            if "writer" not in m.kept:
+                m.kept["writer"] = rig.writer(topic)
+
+        stands = topic != "/lowstate"
+        yield _stop(f"second writer of {topic}", (Reason.WRITERS,), 0.052, gate=second, stands=stands)
+
+    def writes(topic: str) -> Callable[[FaultMoment, Any], None]:
+        def write(m: FaultMoment, rig: Any) -> None:
+            if "writer" not in m.kept:
+                m.kept["writer"] = rig.writer(topic)
+            q = np.full(NUM_JOINTS, 0.3)
+            zeros, ones = np.zeros(NUM_JOINTS), np.ones(NUM_JOINTS)
+            command = LowCommand(rig.t, q, zeros, zeros, 200.0 * ones, 2.0 * ones)
+            m.kept["writer"].write(encode_low_command(command, 0, answers=rig.t))
+
+        return write
+
+    both = (Reason.WRITERS, Reason.NOT_IN_CONTROL)
+    yield _stop("a second stack that commands", both, 0.052, gate=writes("/safety/lowcmd_in"), stands=True)
+    # Its commands are overtaken by the gate's within the tick; that they come is said all the same.
+    yield _stop("a second gate that commands", (Reason.NOT_IN_CONTROL,), 0.052, gate=writes("/lowcmd"))
+
+
+def _gate() -> Iterator[Injection]:
+    def held(seconds: float) -> Callable[[FaultMoment, Any], None]:
+        def hold(m: FaultMoment, rig: Any) -> None:
+            rig.held = m.t < seconds
+
+        return hold
+
+    def shifted(seconds: float) -> Callable[[FaultMoment, Any], None]:
+        def shift(m: FaultMoment, rig: Any) -> None:
+            rig.clock = seconds
+
+        return shift
+
+    for seconds in (0.02, 0.06):
+        yield Injection(
+            f"gate held up for {1e3 * seconds:g} ms", FaultSource.DEVICE, Expect.BEAR, gate=held(seconds), stands=True
+        )
+    for seconds in (0.3, 1.0):
+        yield _stop(f"gate held up for {1e3 * seconds:g} ms", (Reason.STALLED,), seconds + 0.004, gate=held(seconds))
+    for seconds in (-1.0, -0.01):
+        yield _stop(f"gate's clock {seconds:+g} s", (Reason.CLOCK,), gate=shifted(seconds))
+    for seconds in (0.2, 10.0):
+        yield _stop(f"gate's clock {seconds:+g} s", (Reason.STALLED,), gate=shifted(seconds))
+
 
 FAULTS: dict[str, Injection] = {
     fault.name: fault

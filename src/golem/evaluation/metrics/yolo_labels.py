@@ -10,8 +10,7 @@ import numpy as np
 import yaml
 
 from golem.errors import ConfigError
-from golem.evaluation.metrics.coco import LabelledImage, label_of
-from golem.evaluation.metrics.coco_folder import EDGE, check_boxes, coco_files, image_size, read_coco
+from golem.evaluation.metrics.coco import EDGE, LabelledImage, check_boxes, coco_files, image_size, label_of, read_coco
 from golem.types import Array
 
 KINDS = (".jpg", ".jpeg", ".png", ".bmp", ".webp")

@@ -4,6 +4,11 @@ Nodes are passive: nothing of the user's runs but inside `poll` and `spin_once`,
 raises is logged and goes no further: a service then answers with zeros, a goal is aborted. Types go by their ROS names
 (`std_msgs/msg/String`, `std_srvs/srv/SetBool`, `golem_interfaces/action/Pick`); messages are the classes of
 `golem.middleware.ros.codec`. Names are absolute, relative to the node's namespace, or private (`~/x`).
+
+The parameter services that every ROS 2 node has, for nodes that have no parameters.
+
+`ros2 param list` and its like wait for them at every node they see, until a timeout where there are none. The options
+of GOLEM's modules are in its stack files and hold for a whole run: nothing can be set here, and the answer says so.
 """
 
 from __future__ import annotations
@@ -12,17 +17,43 @@ import time
 from collections.abc import Callable
 from typing import Any, TypeVar
 
+import numpy as np
+
 from golem.middleware.dds.base import DEFAULT, Participant, Qos
-from golem.middleware.ros import names, parameters
+from golem.middleware.ros import names
 from golem.middleware.ros.action_client import ActionClient
 from golem.middleware.ros.action_server import RESULT_TIMEOUT, ActionHandler, ActionServer
 from golem.middleware.ros.callback_guard import CallbackGuard, log_error
 from golem.middleware.ros.codec import DEFAULT_DISTRO
 from golem.middleware.ros.future import Future
 from golem.middleware.ros.graph import DiscoveryInfo
+from golem.middleware.ros.msgs import rcl_interfaces as rcl
 from golem.middleware.ros.node_endpoints import NodeEndpoints
 from golem.middleware.ros.pubsub import Publisher, Subscription
 from golem.middleware.ros.service import Client, Service
+
+REFUSED = rcl.SetParametersResult(
+    False, "GOLEM has no ROS parameters; the options of its modules are in the stack file."
+)
+SERVICES: dict[str, tuple[str, Callable[[Any], Any]]] = {
+    "list_parameters": ("ListParameters", lambda _: rcl.ListParameters_Response()),
+    "get_parameters": (
+        "GetParameters",
+        lambda asked: rcl.GetParameters_Response([rcl.ParameterValue() for _ in asked.names]),
+    ),
+    "get_parameter_types": (
+        "GetParameterTypes",
+        lambda asked: rcl.GetParameterTypes_Response(np.zeros(len(asked.names), np.uint8)),
+    ),
+    "describe_parameters": (
+        "DescribeParameters",
+        lambda asked: rcl.DescribeParameters_Response([rcl.ParameterDescriptor(n) for n in asked.names]),
+    ),
+    "set_parameters": ("SetParameters", lambda asked: rcl.SetParameters_Response([REFUSED for _ in asked.parameters])),
+    "set_parameters_atomically": ("SetParametersAtomically", lambda _: rcl.SetParametersAtomically_Response(REFUSED)),
+}
+"""Name within the node, short type name, and what answers."""
+
 
 T = TypeVar("T")
 LOOK = 0.02
@@ -65,7 +96,7 @@ class RosNode:
         self.guard = CallbackGuard(log)
         info = DiscoveryInfo(participant, namespace, name, distro)
         self._endpoints = NodeEndpoints(participant, info, self.guard)
-        for service, (kind, answer) in parameters.SERVICES.items():
+        for service, (kind, answer) in SERVICES.items():
             self.service(f"~/{service}", f"rcl_interfaces/srv/{kind}", answer)
 
     def publisher(self, topic: str, type: str, qos: Qos = DEFAULT) -> Publisher:

@@ -10,6 +10,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from mujoco.introspect import ast_nodes, structs
 
 from golem.kernels import cfunc, njit
 from golem.native import (
@@ -28,7 +29,6 @@ from golem.native import (
     words,
 )
 from golem.robots.model.imu_mount import TORSO, torso_motion
-from golem.robots.mujoco.c_structs import data_struct, struct
 from golem.robots.mujoco.external_forces import PUSHES, apply_pushes, clear_pushes
 from golem.robots.mujoco.hand_servos import HAND, drive_hand, move_reference, read_hand
 from golem.robots.mujoco.hoist import HOIST, pull
@@ -38,6 +38,54 @@ from golem.robots.sensors.imu import BLOCK, IMU, measure_imu
 from golem.robots.sensors.sway import TONES
 from golem.robots.worlds.fridge import seal_torque
 from golem.types import COMMAND_AGE, NUM_JOINTS
+
+_NUMBERS: dict[str, Any] = {
+    "int": ctypes.c_int,
+    "float": ctypes.c_float,
+    "size_t": ctypes.c_size_t,
+    "uintptr_t": ctypes.c_size_t,
+    "mjtSize": ctypes.c_int64,
+    "mjtNum": ctypes.c_double,
+    "mjtBool": ctypes.c_bool,
+    "mjtByte": ctypes.c_ubyte,
+    "uint64_t": ctypes.c_uint64,
+    "uint32_t": ctypes.c_uint32,
+    "int64_t": ctypes.c_int64,
+}
+
+
+@cache
+def struct(name: str) -> type[ctypes.Structure]:
+    """Return the C struct called `name`, as the bindings describe it.
+
+    Raises:
+        KeyError: it, or the type of one of its fields, is not described.
+    """
+    described: Any = structs.STRUCTS[name]
+    fields = [(field.name, _kind(field.type)) for field in described.fields]
+    return type(name, (ctypes.Structure,), {"_fields_": fields})
+
+
+def _kind(declared: Any) -> Any:
+    if isinstance(declared, ast_nodes.PointerType):
+        return ctypes.c_void_p
+    if isinstance(declared, ast_nodes.ArrayType):
+        inner = _kind(declared.inner_type)
+        for extent in reversed(declared.extents):
+            inner *= extent
+        return inner
+    return _NUMBERS.get(declared.name) or struct(declared.name)
+
+
+def data_struct(data: mujoco.MjData) -> Any:
+    """Return the struct behind `data`, which it shares; None where the bindings' description does not fit it."""
+    try:
+        found: Any = struct("mjData").from_address(data._address)
+        fits = found.time == data.time and found.ncon == data.ncon and found.qpos == data.qpos.ctypes.data
+    except KeyError:
+        return None
+    return found if fits else None
+
 
 MOVING = 0.02
 """Speed of a screw above which it counts as moving [m/s, rad/s]."""

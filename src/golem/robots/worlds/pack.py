@@ -13,18 +13,59 @@ import mujoco
 import numpy as np
 
 from golem.errors import ConfigError
-from golem.robots.worlds import hall, nuts, parts, screws, tray
+from golem.robots.worlds import hall, pack_part, parts, screws
 from golem.robots.worlds.ioniq5 import Ioniq5Layout, add_cover
-from golem.robots.worlds.layout import PackLayout, yaw_quat
+from golem.robots.worlds.layout import PackLayout, TrayPlace, yaw_quat
 from golem.robots.worlds.pack_part import COVER, PackPart, Span, add_hole, add_legs, add_slab, square, without
 from golem.robots.worlds.screws import ScrewDraw
 from golem.types import Array, PlanarPose
+
+WALL = 0.003
+_BOX = mujoco.mjtGeom.mjGEOM_BOX
+
+
+def add_tray(spec: mujoco.MjSpec, layout: PackLayout, place: TrayPlace) -> None:
+    """Add the tray as a static body at its underside's centre, on a pedestal when it stands off the cover."""
+    sx, sy, sz = layout.tray_size
+    paint = "stand_blue" if place.kind == "nut" else "tray_teal"
+    body = spec.worldbody.add_body(name=place.name, pos=[place.x, place.y, place.z], quat=yaw_quat(place.yaw))
+    hx, hy, hz = sx / 2, sy / 2, sz / 2
+    walls = [
+        ((hx, hy, WALL / 2), (0.0, 0.0, WALL / 2)),
+        ((WALL / 2, hy, hz), (hx - WALL / 2, 0.0, hz)),
+        ((WALL / 2, hy, hz), (-hx + WALL / 2, 0.0, hz)),
+        ((hx, WALL / 2, hz), (0.0, hy - WALL / 2, hz)),
+        ((hx, WALL / 2, hz), (0.0, -hy + WALL / 2, hz)),
+    ]
+    for k, (size, pos) in enumerate(walls):
+        parts.collider(body, _BOX, size, pos, friction=0.8)
+        parts.visual(body, _BOX, size, pos, material=paint, name=f"{place.name}_part_{k}")
+    rim = 0.006
+    for k, (size, pos) in enumerate(
+        [
+            ((rim / 2, hy + rim / 2, 0.0015), (hx, 0.0, sz)),
+            ((rim / 2, hy + rim / 2, 0.0015), (-hx, 0.0, sz)),
+            ((hx + rim / 2, rim / 2, 0.0015), (0.0, hy, sz)),
+            ((hx + rim / 2, rim / 2, 0.0015), (0.0, -hy, sz)),
+        ]
+    ):
+        parts.visual(body, _BOX, size, pos, material=paint, name=f"{place.name}_rim_{k}")
+    x, y, _, _ = np.linalg.inv(layout.pose()) @ (place.x, place.y, place.z, 1.0)
+    over_cover = 0.0 < x < layout.size_x and abs(y) < layout.size_y / 2
+    foot = layout.top_z if over_cover else 0.0
+    if place.z - foot > 0.005:
+        post = (place.z - foot) / 2
+        radius = 0.03
+        parts.visual(body, mujoco.mjtGeom.mjGEOM_CYLINDER, (radius, post), (0, 0, -post), material="stand_blue")
+        parts.collider(body, mujoco.mjtGeom.mjGEOM_CYLINDER, (radius, post), (0, 0, -post))
+        if not over_cover:
+            parts.visual(body, _BOX, (hx, hy, 0.01), (0, 0, -2 * post + 0.01), material="stand_blue")
+
 
 STUD_PITCH = 0.09
 FASTENER_HEAD = (0.0105, 0.006)
 """Across flats and height of the heads that are still tight [m]."""
 
-_BOX = mujoco.mjtGeom.mjGEOM_BOX
 _CYLINDER = mujoco.mjtGeom.mjGEOM_CYLINDER
 
 
@@ -94,14 +135,14 @@ def add_pack(
     else:
         _add_stand(body, layout)
         _add_rim(spec, body, layout, loose | dict.fromkeys(layout.empty_holes, 0.003))
-    nuts.add_meshes(spec)
+    pack_part.add_meshes(spec)
     found = _add_window(body, layout)
     found += _add_fasteners(spec, body, layout, set(slots))
     for draw in draws:
-        (nuts.add_stud if draw.kind == "nut" else screws.add_bore)(body, draw, spots[draw.slot])
+        (pack_part.add_stud if draw.kind == "nut" else screws.add_bore)(body, draw, spots[draw.slot])
     for draw in draws:
         name, spot = draw.name, spots[draw.slot]
-        (nuts.add_nut if draw.kind == "nut" else screws.add_screw)(spec, draw, spot, T, sleep=sleep)
+        (pack_part.add_nut if draw.kind == "nut" else screws.add_screw)(spec, draw, spot, T, sleep=sleep)
         reach = draw.protrusion + draw.head_height
         looks = (f"{name}_flange",) if draw.kind == "nut" else (f"{name}_flange", f"{name}_thread")
         looks += (f"{name}_hex",) if draw.hexagonal or draw.kind == "nut" else ()
@@ -110,7 +151,7 @@ def add_pack(
         found.append(PackPart(label, name, looks, spot + reach * draw.axis(), size))
     found = [replace(part, position=T[:3, :3] @ part.position + T[:3, 3]) for part in found]
     for place in layout.trays():
-        tray.add_tray(spec, layout, place)
+        add_tray(spec, layout, place)
         geoms = tuple(f"{place.name}_part_{k}" for k in range(5)) + tuple(f"{place.name}_rim_{k}" for k in range(4))
         found.append(PackPart("tray", place.name, geoms, place.pose()[:3, 3], np.array(layout.tray_size)))
     mouths = np.array([spots[s] for s in slots]).reshape(-1, 3)
@@ -253,7 +294,7 @@ def _add_bus_bar(body: mujoco.MjsBody, pos: tuple[float, float, float], name: st
     for end in (-1, 1):
         nx, ny = (x, y + end * STUD_PITCH / 2) if along else (x + end * STUD_PITCH / 2, y)
         label = f"nut_{name[8:]}_{'b' if end > 0 else 'a'}"
-        found.append(nuts.add_tight(body, (nx, ny, z + thick), label))
+        found.append(pack_part.add_tight(body, (nx, ny, z + thick), label))
     return found
 
 
@@ -272,9 +313,9 @@ def _add_fasteners(spec: mujoco.MjSpec, body: mujoco.MjsBody, layout: PackLayout
             continue
         if layout.kind(slot) == "nut":
             if slot in layout.empty_holes:
-                nuts.add_bare(body, at)
+                pack_part.add_bare(body, at)
             else:
-                found.append(nuts.add_tight(body, at, f"nut_{slot:02d}"))
+                found.append(pack_part.add_tight(body, at, f"nut_{slot:02d}"))
         elif slot in layout.empty_holes:
             found.append(PackPart("screw_hole", "pack", (), at, np.array([0.006, 0.006, 0.0])))
         else:

@@ -6,16 +6,67 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from golem.capabilities.legs.balance_errors import balance_errors
 from golem.capabilities.legs.base import LocomotionCommand
 from golem.capabilities.legs.gait import GaitConfig
 from golem.capabilities.legs.hold import STANCES, height_of, squat, standing
-from golem.capabilities.legs.mpc.cost import CostConfig, cost
 from golem.capabilities.legs.mpc.planner import Planner, PlannerConfig
-from golem.capabilities.legs.mpc.planning_model import PlanningModel
+from golem.capabilities.legs.mpc.planning_model import PlanningModel, Stance, Trajectories
 from golem.errors import ConfigError, GolemError, unknown_name
 from golem.finite import check_finite, check_measured
 from golem.interfaces.payloads import LegCommand
 from golem.types import LEGS, Array, BaseEstimate, LowState
+
+
+@dataclass(frozen=True, slots=True)
+class CostConfig:
+    """Weights of the squared residuals; each residual is divided by what makes it count as 1.
+
+    Attributes:
+        height: CoM height against that of the reference stance, 5 cm.
+        velocity: horizontal CoM velocity, 0.2 m/s.
+        orientation: tilt of base_link, 0.1 rad, and half as much its angular rate, 1 rad/s.
+        capture: capture point against the middle of the feet, 5 cm.
+        feet: feet against where they belong relative to each other, 5 cm.
+        effort: motor torques against the motors' bounds, mean over the motors.
+        posture: leg joints against those of the stance, 0.1 rad, mean over the joints.
+    """
+
+    height: float = 1.0
+    velocity: float = 0.5
+    orientation: float = 1.0
+    capture: float = 2.0
+    feet: float = 0.3
+    effort: float = 3.0
+    posture: float = 0.3
+
+
+def cost(config: CostConfig, runs: Trajectories, stance: Stance, torque: Array) -> Array:
+    """Return the (n,) costs of `runs`.
+
+    Args:
+        config: weights.
+        runs: n rollouts of m steps.
+        stance: the reference stance.
+        torque: (12,) bounds of the motor torques [N m].
+    """
+    capture, misplaced = balance_errors(runs.R, runs.com, runs.com_velocity, runs.soles, stance.feet)
+    height = runs.com[..., 2] - runs.soles[..., 2].min(axis=-1) - stance.com_height
+    total = (
+        config.height * (height / 0.05) ** 2
+        + config.velocity * _square(runs.com_velocity[..., :2] / 0.2)
+        + config.orientation * (_square(runs.R[..., 2, :2] / 0.1) + 0.5 * _square(runs.rate))
+        + config.capture * _square(capture / 0.05)
+        + config.feet * (misplaced / 0.05) ** 2
+        + config.effort * _square(runs.torque / torque) / torque.size
+        + config.posture * _square((runs.q - stance.posture) / 0.1) / torque.size
+    )
+    return total.mean(axis=-1)
+
+
+def _square(residual: Array) -> Array:
+    return np.einsum("...i,...i->...", residual, residual)
+
 
 FAILURES = 5
 """Plans in a row that may fail: a tenth of a second at 50 plans a second, on the plan of before."""
