@@ -8,8 +8,7 @@ import warnings
 import pytest
 
 from golem.errors import SlowModule
-from golem.runtime.call_times import FIRST, MIN_SLOW, PATIENCE, STRIDE
-from golem.runtime.contract_check import ContractCheck
+from golem.runtime.contract_check import FIRST, MIN_SLOW, PATIENCE, STRIDE, ContractCheck
 
 
 class Clock:
@@ -34,7 +33,7 @@ class Clock:
 
 def said(monkeypatch: pytest.MonkeyPatch, clock: Clock, calls: int, allowed: float | None = 0.01) -> list[str]:
     """Return the warnings of so many calls."""
-    monkeypatch.setattr("golem.runtime.call_times.time", clock)
+    monkeypatch.setattr("golem.runtime.contract_check.time", clock)
     contract = ContractCheck("upper_body", "mine.py:Arms")
     if allowed is not None:
         contract.times.allowed = allowed
@@ -65,7 +64,7 @@ def test_a_slow_start_is_not_named(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = Clock(work=0.05)
     contract = ContractCheck("upper_body", "mine.py:Arms")
     contract.times.allowed = 0.01
-    monkeypatch.setattr("golem.runtime.call_times.time", clock)
+    monkeypatch.setattr("golem.runtime.contract_check.time", clock)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         for k in range(500):

@@ -5,8 +5,7 @@ from __future__ import annotations
 from golem.hardware.safety.base import SafetyLimits
 from golem.interfaces.payloads import GateState, Reason
 from golem.middleware.bus import Bus
-from golem.runtime.gate_tally import GateTally, current_tally, tallied
-from golem.runtime.safety_nodes import SafetyNode
+from golem.runtime.safety_nodes import GateTally, SafetyNode, current_tally, tallied
 
 
 def test_time_and_stops_are_counted_without_those_that_were_asked_for() -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from golem.capabilities.memory.sqlite_file import SqliteFile
+from golem.capabilities.memory.memory_file import SqliteFile
 from golem.errors import ConfigError
 from golem.skills.fastener_list import KINDS, Listed
 from golem.types import Array, PlanarPose, Side

@@ -10,7 +10,7 @@ import numpy as np
 
 from golem.capabilities.arms.base import ARM_COLUMNS
 from golem.capabilities.arms.goal_postures import POSITION, GoalPostures
-from golem.capabilities.arms.line_check import LineChecker
+from golem.capabilities.arms.line import LineChecker
 from golem.capabilities.collision.collision_model import CollisionModel
 from golem.capabilities.collision.obstacles import World, cleared
 from golem.capabilities.collision.scene_cloud import displaced, scene_world

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from golem.capabilities.arms.base import TargetError
-from golem.capabilities.arms.line_check import LineChecker
+from golem.capabilities.arms.line import LineChecker
 from golem.capabilities.arms.postures import posture
 from golem.capabilities.collision.obstacles import Obstacle, World
 from golem.capabilities.planning.base import PlanRefused, Refusal

@@ -9,9 +9,8 @@ import pytest
 
 from golem.capabilities.grasping.antipodal import Antipodal
 from golem.capabilities.grasping.base import Grasp, Gripper
-from golem.capabilities.grasping.grasp_net import GraspNet, load_net
 from golem.capabilities.grasping.hand_view import FACTS, SEEN, hand_view, mirrored
-from golem.capabilities.grasping.scorer import Scorer, ScorerConfig
+from golem.capabilities.grasping.scorer import GraspNet, Scorer, ScorerConfig, load_net
 from golem.errors import ConfigError
 
 from . import things

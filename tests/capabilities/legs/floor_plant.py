@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from golem.capabilities.legs.base import STANDING, LowerBody
-from golem.evaluation.passport.floor import STEP, Floor
+from golem.evaluation.passport.trial import STEP, Floor
 from golem.interfaces.payloads import LegCommand
 from golem.types import Array
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from golem.hardware.estimator.contact import Contact, ContactConfig
+from golem.hardware.estimator.feet import Contact, ContactConfig
 
 DT = 0.002
 

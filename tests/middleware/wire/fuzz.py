@@ -28,7 +28,7 @@ from golem.interfaces import unitree_api
 from golem.interfaces.unitree_api import LOCO_APIS
 from golem.middleware.wire import api, convert, hg
 from golem.middleware.wire.api import ApiRequest, Response
-from golem.middleware.wire.crc import Checksum
+from golem.middleware.wire.hg import Checksum
 from golem.middleware.wire.struct_layout import WireError
 from golem.robots.unitree.loco_service import LocoService
 from golem.robots.unitree.motion_switcher import CHECK_MODE, RELEASE_MODE, SELECT_MODE, MotionSwitcher

@@ -10,7 +10,7 @@ import numpy as np
 from tests.middleware.wire import go
 
 from golem.middleware.wire import hg
-from golem.middleware.wire.crc import Checksum
+from golem.middleware.wire.hg import Checksum
 from golem.middleware.wire.struct_layout import StructLayout
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from golem.middleware.wire import hg
-from golem.middleware.wire.crc import REVERSED, crc32
+from golem.middleware.wire.hg import REVERSED, crc32
 
 
 def bitwise(words: bytes) -> int:

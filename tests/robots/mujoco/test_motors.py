@@ -8,7 +8,7 @@ import pytest
 
 from golem.robots.model.mjcf import robot_spec
 from golem.robots.mujoco.motors import Motors
-from golem.robots.sensors.motor_errors import MotorErrors
+from golem.robots.sensors.profiles import MotorErrors
 from golem.types import NUM_JOINTS, LowCommand
 
 ZERO = np.zeros(NUM_JOINTS)

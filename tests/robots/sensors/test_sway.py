@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
+from golem.robots.sensors.profiles import draw_sway
 from golem.robots.sensors.streams import stream
-from golem.robots.sensors.sway import draw_sway
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -10,8 +10,7 @@ import pytest
 
 from golem.errors import ConfigError
 from golem.runtime.bringup.base import BringupConfig, BringupStep, StepFinding, StepRefused, Task, Workbench
-from golem.runtime.bringup.bringup_command import CHECKS, run_checks
-from golem.runtime.bringup.bringup_report import FILE, BringupReport
+from golem.runtime.bringup.bringup_command import CHECKS, FILE, BringupReport, run_checks
 
 
 class Nobody:

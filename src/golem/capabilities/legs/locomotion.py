@@ -18,9 +18,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from golem.capabilities.legs.base import STANDING, ZERO, LocomotionCommand, LowerBody, follows
-from golem.capabilities.legs.command_blender import CommandBlender
 from golem.capabilities.legs.gait import Bools, Gait
 from golem.capabilities.legs.gait_clock import GaitClock
+from golem.capabilities.legs.handover import CommandBlender
 from golem.capabilities.legs.rate_divider import RateDivider
 from golem.capabilities.legs.stop_predictor import StopPredictor
 from golem.capabilities.legs.velocity_integrator import VelocityIntegrator, VelocityIntegratorConfig

@@ -14,8 +14,7 @@ from scipy.optimize import linear_sum_assignment
 
 from golem.capabilities.memory.base import Evidence, Observation, Place, When, check_observation, check_query
 from golem.capabilities.memory.look import Look, look_at
-from golem.capabilities.memory.memory_file import MemoryFile
-from golem.capabilities.memory.object_records import (
+from golem.capabilities.memory.memory_file import (
     BELIEF,
     EVIDENCE,
     FIRST,
@@ -25,6 +24,7 @@ from golem.capabilities.memory.object_records import (
     PLACE,
     SIZE,
     VARIANCE,
+    MemoryFile,
     ObjectRecords,
 )
 from golem.capabilities.memory.words import label_scores

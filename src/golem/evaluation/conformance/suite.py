@@ -16,8 +16,7 @@ import numpy as np
 from golem.errors import GolemError, ModuleFault
 from golem.evaluation.conformance.base import Candidate, Inapplicable, check, gate
 from golem.evaluation.conformance.impurities import CLOCK, FILE, RANDOM, THREAD, Impurity, impurities
-from golem.runtime.call_times import FAR
-from golem.runtime.contract_check import ContractCheck
+from golem.runtime.contract_check import FAR, ContractCheck
 
 
 def difference(a: Any, b: Any, where: str = "the answer") -> str:

@@ -9,8 +9,7 @@ from typing import Literal
 import numpy as np
 
 from golem.capabilities.memory.base import Memory, Place
-from golem.evaluation.episodes.relocation import Relocation
-from golem.evaluation.episodes.relocation_room import Thing
+from golem.evaluation.episodes.relocation import Relocation, Thing
 
 HIT = 1.0
 """Distance up to which an answer is right [m]: the same counter, the next ones being 2.4 m away [own]."""

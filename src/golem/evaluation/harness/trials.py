@@ -22,7 +22,7 @@ from golem.evaluation.harness.run_folder import Finished
 from golem.evaluation.no_search import searching_forbidden
 from golem.provenance import changes, code_files, commit, digest, versions
 from golem.runtime.contract_check import ContractCheck
-from golem.runtime.gate_tally import GateTally, tallied
+from golem.runtime.safety_nodes import GateTally, tallied
 from golem.skills.base import FAULT
 from golem.skills.runner import SLOT, SkillRun
 

@@ -13,9 +13,8 @@ from golem.capabilities.legs.passports.base import Passport
 from golem.capabilities.legs.passports.onnx_metadata import said_joints
 from golem.errors import ConfigError
 from golem.evaluation.passport.base import Mistake
-from golem.evaluation.passport.floor import Floor
 from golem.evaluation.passport.repairs import Repair, repairs
-from golem.evaluation.passport.trial import SOUND, Trial, walk
+from golem.evaluation.passport.trial import SOUND, Floor, Trial, walk
 from golem.robots.model.limits import load_limits
 from golem.robots.model.table import JOINT_NAMES
 from golem.types import LEGS, Array

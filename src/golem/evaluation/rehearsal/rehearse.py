@@ -26,8 +26,7 @@ from golem.robots.model.table import JOINT_INDEX, JOINTS
 from golem.robots.mujoco.config import MujocoConfig
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.runtime.bringup.base import Act, BringupConfig, Task
-from golem.runtime.bringup.bringup_command import CHECKS, run_bringup
-from golem.runtime.bringup.bringup_report import FILE
+from golem.runtime.bringup.bringup_command import CHECKS, FILE, run_bringup
 from golem.runtime.bringup.robot_link import RobotLink
 from golem.runtime.live.launch import Process
 from golem.runtime.live.node_setup import log_line, member

@@ -18,8 +18,15 @@ from golem.evaluation.metrics.tables import all_cases, comparisons, metric_diffe
 from golem.evaluation.metrics.text_table import short_names
 from golem.evaluation.report.html_page import render_page
 from golem.evaluation.report.ladder_plots import failure_plot, own_plot, rate_plot, time_plot
-from golem.evaluation.report.margin_box import MarginBox, kept_traces, margin_box, margin_boxes
-from golem.evaluation.report.margin_plot import MAX_CURVES, MarginCurve, margin_plot
+from golem.evaluation.report.margin_plot import (
+    MAX_CURVES,
+    MarginBox,
+    MarginCurve,
+    kept_traces,
+    margin_box,
+    margin_boxes,
+    margin_plot,
+)
 from golem.evaluation.report.svg_figure import styled
 
 MAX_FILMS = 24

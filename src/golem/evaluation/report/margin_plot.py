@@ -4,11 +4,75 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
+from golem.evaluation.harness.records import TrialRecord, artefacts
 from golem.evaluation.report.svg_figure import COLOUR, method_colour, page_figure, svg
-from golem.robots.mujoco.balance import BalanceTrace
+from golem.robots.mujoco.balance import TRACE, BalanceTrace
+
+ROW = 30.0
+"""Height of a box with its name [px]."""
+FRAME = 70.0
+"""Height of what is around the boxes [px]."""
+
+
+@dataclass(frozen=True, slots=True)
+class MarginBox:
+    """The trials of one box.
+
+    Attributes:
+        name: in words.
+        margins: mean CoM margin of each trial [m].
+        outside: trials whose margin was below zero at any time.
+        colour: number of the method's colour.
+    """
+
+    name: str
+    margins: tuple[float, ...]
+    outside: int
+    colour: int
+
+
+def kept_traces(records: Sequence[TrialRecord], folder: Path) -> list[tuple[TrialRecord, BalanceTrace]]:
+    """Return the trials in the run `folder` that kept a trace, with it."""
+    paths = [(r, artefacts(folder, r) / TRACE) for r in records]
+    return [(r, BalanceTrace.load(path)) for r, path in paths if path.is_file()]
+
+
+def margin_box(name: str, traces: Sequence[BalanceTrace], colour: int) -> MarginBox | None:
+    """Return the box of trials with these traces; None where none has a sample."""
+    margins = [trace.margin for trace in traces if len(trace.margin)]
+    if not margins:
+        return None
+    means = tuple(float(margin.mean()) for margin in margins)
+    return MarginBox(name, means, sum(bool((margin < 0.0).any()) for margin in margins), colour)
+
+
+def margin_boxes(boxes: Sequence[MarginBox]) -> str:
+    """Return the figure: median and quartiles, lines from 10 to 90 %, a dot per trial; empty text without boxes."""
+    if not boxes:
+        return ""
+    figure = page_figure(FRAME + ROW * len(boxes))
+    axes = figure.subplots()
+    for y, box in enumerate(boxes):
+        colour, values = method_colour(box.colour), 1e3 * np.array(box.margins)
+        low, q1, median, q3, high = np.quantile(values, (0.1, 0.25, 0.5, 0.75, 0.9))
+        axes.plot([low, high], [y, y], color=colour, lw=1.2)
+        axes.barh(y, q3 - q1, left=q1, height=0.5, color=colour, alpha=0.3)
+        axes.plot([median, median], [y - 0.25, y + 0.25], color=colour, lw=2)
+        red = values < 0.0
+        for chosen, dot in ((~red, colour), (red, COLOUR["lost"])):
+            axes.plot(values[chosen], np.full(int(chosen.sum()), y), ".", color=dot, ms=4, alpha=0.7)
+        text = f"{median:.0f} mm, {box.outside} of {len(values)} below zero once"
+        axes.text(1.01, y, text, transform=axes.get_yaxis_transform(), va="center", color=COLOUR["muted"])
+    axes.axvline(0.0, color=COLOUR["lost"], lw=1.2)
+    axes.set(ylim=(len(boxes) - 0.4, -0.6), xlabel="mean CoM margin of a trial [mm]")
+    axes.set_yticks(range(len(boxes)), [box.name for box in boxes])
+    axes.grid(axis="y", visible=False)
+    return svg(figure, "mean CoM margin of whole trials")
+
 
 MAX_CURVES = 60
 """Trials that are drawn at most; more would be a black band."""

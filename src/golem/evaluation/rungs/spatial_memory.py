@@ -14,8 +14,7 @@ from golem import registry
 from golem.capabilities.memory.base import Memory, Place, When
 from golem.evaluation.base import DONE, Case, Outcomes, Results, Rung, TrialOutcome, TrialSpec
 from golem.evaluation.episodes.memory_timeline import ObjectTimeline, hits, timeline
-from golem.evaluation.episodes.relocation import Rates, Relocation, Setting, relocation
-from golem.evaluation.episodes.relocation_room import Thing
+from golem.evaluation.episodes.relocation import Rates, Relocation, Setting, Thing, relocation
 from golem.evaluation.metrics.statistics import mean_interval
 from golem.evaluation.metrics.text_table import TextTable
 from golem.evaluation.report.svg_figure import COLOUR

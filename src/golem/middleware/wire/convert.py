@@ -14,7 +14,7 @@ import numpy as np
 
 from golem.middleware.dds.base import ENCAPSULATION, Payload
 from golem.middleware.wire import hg
-from golem.middleware.wire.crc import Checksum
+from golem.middleware.wire.hg import Checksum
 from golem.middleware.wire.struct_layout import StructLayout, WireError
 from golem.types import NUM_JOINTS, Array, Imu, LowCommand, LowState
 

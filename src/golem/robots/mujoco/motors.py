@@ -11,7 +11,7 @@ from golem.errors import ConfigError
 from golem.kernels import njit
 from golem.native import COMMAND, Record, Records, address, floats, new_record, view
 from golem.native_messages import put_command
-from golem.robots.sensors.motor_errors import MotorErrors, per_joint
+from golem.robots.sensors.profiles import MotorErrors, per_joint
 from golem.types import NUM_JOINTS, TICK, Array, LowCommand
 
 SLOTS = 128

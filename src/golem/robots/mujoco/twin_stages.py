@@ -35,7 +35,7 @@ from golem.robots.mujoco.hoist import HOIST, pull
 from golem.robots.mujoco.motors import MOTORS, drive, give, report
 from golem.robots.mujoco.scene import COARSE_STEP, FINE_STEP
 from golem.robots.sensors.imu import BLOCK, IMU, measure_imu
-from golem.robots.sensors.sway import TONES
+from golem.robots.sensors.profiles import TONES
 from golem.robots.worlds.fridge import seal_torque
 from golem.types import COMMAND_AGE, NUM_JOINTS
 

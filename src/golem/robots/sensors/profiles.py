@@ -17,13 +17,82 @@ from scipy.spatial.transform import Rotation
 
 from golem.errors import ConfigError, unknown_name
 from golem.options import check_values, convert_all, read_yaml
+from golem.robots.model.table import JOINT_INDEX
 from golem.robots.sensors.cameras import CAMERAS
 from golem.robots.sensors.depth import DepthErrors
 from golem.robots.sensors.imu import ImuBias, ImuErrors
-from golem.robots.sensors.motor_errors import MotorErrors, per_joint
-from golem.robots.sensors.sway import Sway, draw_sway
 from golem.robots.worlds.screws import ScrewRanges
 from golem.types import LEGS, NUM_JOINTS, UPPER, Array
+
+
+@dataclass(frozen=True, slots=True)
+class MotorErrors:
+    """Magnitudes of the errors of a motor's report; zeros of the encoders are `arm_offset` and `leg_offset`.
+
+    Attributes:
+        encoder_step: least difference of two positions [rad].
+        speed_noise: standard deviation of a speed, white at 500 Hz [rad/s].
+        torque_noise: the same of a torque [N m].
+        torque_gain: standard deviation of the share by which a joint's torques are wrong, constant over an episode.
+        torque_gains: by joint the share about which it scatters; 0 where a joint is not named.
+    """
+
+    encoder_step: float = 0.0
+    speed_noise: float = 0.0
+    torque_noise: float = 0.0
+    torque_gain: float = 0.0
+    torque_gains: dict[str, float] = field(default_factory=dict[str, float])
+
+
+def per_joint(values: object) -> Array:
+    """Return the (27,) `values`, a mapping by joint, in motor order; 0 where a joint is not named.
+
+    Raises:
+        ConfigError: they are none, or one is no small number.
+    """
+    if not isinstance(values, dict):
+        raise ConfigError(f"Zeros and torque gains are mappings by joint, not {values!r}.")
+    out = np.zeros(NUM_JOINTS)
+    for name, value in values.items():
+        if name not in JOINT_INDEX:
+            raise unknown_name("joint", name, JOINT_INDEX)
+        if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= 0.5:
+            raise ConfigError(f"The zero or torque gain of {name} is a number from -0.5 to 0.5, not {value!r}.")
+        out[JOINT_INDEX[name]] = value
+    return out
+
+
+TONES = 4
+"""Sinusoids per axis."""
+BAND = (0.2, 0.8)
+"""Frequencies [Hz]; assumption: a pendulum of 4 m to 1 m (0.25 to 0.5 Hz), with a margin."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sway:
+    """A sum of sinusoids per axis; a function of time alone.
+
+    Attributes:
+        amplitude: of every sinusoid [m].
+        omega: (2, TONES) angular frequencies [rad/s].
+        phase: (2, TONES) [rad].
+    """
+
+    amplitude: float
+    omega: Array
+    phase: Array
+
+    def offset(self, t: float) -> Array:
+        """Return the (2,) displacement x, y from the undisturbed place at time `t` [s], in metres."""
+        return self.amplitude * np.sin(self.omega * t + self.phase).sum(axis=1)
+
+
+def draw_sway(radial_rms: float, rng: np.random.Generator) -> Sway:
+    """Draw a sway whose radial displacement has the given RMS [m] over a long time."""
+    omega = 2 * np.pi * rng.uniform(*BAND, size=(2, TONES))
+    phase = rng.uniform(0, 2 * np.pi, size=(2, TONES))
+    # Each of the 2 TONES sinusoids contributes amplitude^2 / 2 to the mean square radius.
+    return Sway(radial_rms / np.sqrt(TONES), omega, phase)
 
 
 @dataclass(frozen=True, slots=True)

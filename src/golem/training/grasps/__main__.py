@@ -11,8 +11,8 @@ import numpy as np
 import tyro
 from numpy.typing import NDArray
 
-from golem.capabilities.grasping.grasp_net import GraspNet, load_net
 from golem.capabilities.grasping.hand_view import FACTS, SEEN, mirrored
+from golem.capabilities.grasping.scorer import GraspNet, load_net
 from golem.errors import ConfigError, MissingExtra
 from golem.figures import blank_figure
 from golem.robots.sensors.streams import stream
