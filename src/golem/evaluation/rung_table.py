@@ -6,55 +6,15 @@ from collections.abc import Sequence
 
 from golem import registry
 from golem.errors import ConfigError, unknown_name
+from golem.package_data import load_data
 
 PROFILES = ("ideal", "bench", "field")
 """Realism profiles of the twin."""
 
-RUNGS: dict[str, str] = {
-    "tether": "golem.evaluation.rungs.pick_screw:TetherRung",
-    "stand": "golem.evaluation.rungs.pick_screw:StandRung",
-    "tether-calibrated": "golem.evaluation.rungs.calibrated_robot:CalibratedTether",
-    "calibration": "golem.evaluation.rungs.calibrated_robot:CalibrationRung",
-    "fridge-tether": "golem.evaluation.rungs.open_fridge:FridgeTether",
-    "fridge-stand": "golem.evaluation.rungs.open_fridge:FridgeStand",
-    "counter-tether": "golem.evaluation.rungs.counter:CounterTether",
-    "counter-stand": "golem.evaluation.rungs.counter:CounterStand",
-    "fetch": "golem.evaluation.rungs.fetch_errand:FetchRung",
-    "push": "golem.evaluation.rungs.push:PushRung",
-    "push-ramp": "golem.evaluation.rungs.push_ramp:PushRampRung",
-    "push-limit": "golem.evaluation.rungs.push_limit:PushLimit",
-    "gate-limits": "golem.evaluation.rungs.gate_limits:GateLimits",
-    "faults": "golem.evaluation.rungs.faults:FaultsRung",
-    "stand-quiet": "golem.evaluation.rungs.stand_minute:StandQuiet",
-    "stand-arms": "golem.evaluation.rungs.stand_minute:StandArms",
-    "walk-twist": "golem.evaluation.rungs.walk_twist:WalkTwist",
-    "walk-stop": "golem.evaluation.rungs.walk_stop:WalkStop",
-    "walk-endurance": "golem.evaluation.rungs.walk_endurance:WalkEndurance",
-    "walk-rough": "golem.evaluation.rungs.walk_rough:WalkRough",
-    "tour": "golem.evaluation.rungs.tour:Tour",
-    "navigate-line": "golem.evaluation.rungs.navigate_line:NavigateLine",
-    "navigate": "golem.evaluation.rungs.navigate_hall:NavigateRung",
-    "var-stand": "golem.evaluation.rungs.var_stand:VarStandRung",
-    "pack": "golem.evaluation.rungs.whole_pack:WholePackRung",
-    "base-estimation": "golem.evaluation.rungs.base_estimation:BaseEstimation",
-    "odometry": "golem.evaluation.rungs.odometry:OdometryRung",
-    "memory": "golem.evaluation.rungs.spatial_memory:MemoryRung",
-    "mpc-rate": "golem.evaluation.rungs.mpc_rate:MpcRate",
-}
-"""Rung name -> `module:Class`; the module is imported when the rung is used."""
-
-COMPARED: dict[str, tuple[str, ...]] = {
-    "grasp_method": (
-        *("tether", "stand", "tether-calibrated", "fridge-tether", "fridge-stand"),
-        *("counter-tether", "counter-stand", "var-stand", "pack"),
-    ),
-    "lower_body": (
-        *("push", "push-ramp", "push-limit", "gate-limits", "stand-quiet", "stand-arms"),
-        *("walk-twist", "walk-stop", "walk-endurance", "walk-rough", "tour", "navigate-line"),
-    ),
-    "memory": ("memory", "fetch"),
-    "navigator": ("navigate",),
-}
+_DATA = load_data(__package__, "rungs.yaml")
+RUNGS: dict[str, str] = _DATA["rungs"]
+"""Rung name -> `module:Class`."""
+COMPARED: dict[str, tuple[str, ...]] = {slot: tuple(rungs) for slot, rungs in _DATA["compared"].items()}
 """Slot -> rungs whose methods are all modules of it."""
 _NUMBERS = {"-n": int, "--n": int, "-j": int, "--j": int, "--seed": int, "--limit": float}
 
