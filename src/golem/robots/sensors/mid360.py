@@ -16,6 +16,8 @@ from scipy.spatial.transform import Rotation
 
 from golem.errors import unknown_name
 from golem.kernels import njit
+from golem.options import fill
+from golem.package_data import load_data
 from golem.robots.sensors.imu import ImuErrors
 from golem.robots.sensors.streams import stream
 from golem.types import Array
@@ -73,39 +75,10 @@ class LidarErrors:
         return T
 
 
-LIDAR_IMU = ImuErrors(
-    # [assumption] a consumer MEMS unit: white noise of one sample at 200 Hz, several times the data sheet's, and a
-    # bias as after a change of temperature.
-    gyro_noise=0.002,
-    acc_noise=0.03,
-    gyro_bias=0.004,
-    acc_bias=0.05,
-)
-
 LIDAR_PROFILES: dict[str, LidarErrors] = {
-    "ideal": LidarErrors(),
-    "bench": LidarErrors(
-        # [vendor] 2 cm at 10 m is the bound of the range error. [assumption] 1 mrad, half a per cent lost.
-        range_noise=0.02,
-        direction_noise=0.001,
-        dropout=0.005,
-        imu=LIDAR_IMU,
-        # [assumption] a machined bracket.
-        mount_rotation=np.deg2rad(0.1),
-        mount_translation=0.001,
-    ),
-    "field": LidarErrors(
-        # [vendor] the bounds of the data sheet: 2 cm at 10 m, 0.15 deg. [assumption] dark and wet surfaces: 3 % lost.
-        range_noise=0.02,
-        direction_noise=np.deg2rad(0.15),
-        dropout=0.03,
-        imu=LIDAR_IMU,
-        # [assumption] a printed bracket.
-        mount_rotation=np.deg2rad(0.5),
-        mount_translation=0.003,
-    ),
+    name: fill(f"key of {name}", LidarErrors, rows) for name, rows in load_data(__package__, "lidar.yaml").items()
 }
-"""Errors of the LiDAR by realism profile."""
+"""Errors of the LiDAR by realism profile; `lidar.yaml`, beside this file, names the source of each number."""
 
 
 def lidar_errors(profile: str) -> LidarErrors:

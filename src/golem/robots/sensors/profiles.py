@@ -1,11 +1,4 @@
-"""How far from perfect the twin is: the realism profiles `ideal`, `bench` and `field`, and the draw of one episode.
-
-Every number names its source: [paper] the GOLEM paper; [authors] measured by the authors, published with their code;
-[vendor] the maker's figures; [C] computed from such figures; [assumption] nobody publishes it.
-
-`field` is the authors' robot as they report it. `bench` is the same hardware after careful calibration and without
-wind in the rope; all its figures are [assumption]s unless they say otherwise. `ideal` has no error at all.
-"""
+"""How far from perfect the twin is: the realism profiles `ideal`, `bench` and `field`, and the draw of one episode."""
 
 from __future__ import annotations
 
@@ -16,7 +9,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from golem.errors import ConfigError, unknown_name
-from golem.options import check_values, convert_all, read_yaml
+from golem.options import check_values, convert_all, fill, read_yaml
+from golem.package_data import load_data
 from golem.robots.model.table import JOINT_INDEX
 from golem.robots.sensors.cameras import CAMERAS
 from golem.robots.sensors.depth import DepthErrors
@@ -162,107 +156,13 @@ class RealismProfile:
         return self.imu.gyro_noise > 0.0
 
 
-NOMINAL_SCREWS = ScrewRanges(
-    friction=(0.35, 0.35), clearance=(0.0003, 0.0003), protrusion=(0.008, 0.008), tilt=(0.0, 0.0)
-)  # fmt: skip
-"""Middle of the ranges of `ScrewRanges`, upright; sizes still differ from screw to screw."""
-
-D400 = DepthErrors(
-    # [vendor] about 0.08 px RMS is the usual sub-pixel figure of a tuned D400 on a textured target.
-    subpixel=0.08,
-    # [assumption] block matching smears the noise over its window: half of the variance, patches of 8 px.
-    correlated=0.5,
-    patch=8,
-    # [vendor] the D4 processor reports disparity in 1/32 px.
-    disparity_step=1 / 32,
-    # [assumption] surfaces seen flatter than this return nothing, and half of a specular one.
-    grazing=np.deg2rad(70.0),
-    specular_loss=0.5,
-    occlusion=True,
-)
-
-MOTORS = MotorErrors(
-    # [assumption] 15 bits per turn of the output, as of the vendor's smaller motors; nobody publishes the H1-2's.
-    encoder_step=2.0 * np.pi / 2**15,
-    # [assumption] what a filtered derivative of such an encoder leaves.
-    speed_noise=0.01,
-    # [assumption] ripple of the currents' measurement, and a torque constant known to 3 %.
-    torque_noise=0.2,
-    torque_gain=0.03,
-)
-
-IMU = ImuErrors(
-    # [assumption] class figures of an industrial MEMS unit; the H1-2's is not published. White noise per sample at
-    # 500 Hz: 0.014 deg/s/sqrt(Hz) and 0.18 mg/sqrt(Hz) over 250 Hz.
-    gyro_noise=0.0039,
-    acc_noise=0.028,
-    # [assumption] what is left after the start-up average: 0.1 deg/s, 5 mg.
-    gyro_bias=0.0017,
-    acc_bias=0.05,
-    # [assumption] roll and pitch of the vendor's filter, mounting included; heading is zeroed at the start.
-    tilt=np.deg2rad(0.3),
-    attitude_noise=np.deg2rad(0.03),
-)
-
 PROFILES: dict[str, RealismProfile] = {
-    "ideal": RealismProfile("ideal", screws=NOMINAL_SCREWS),
-    "bench": RealismProfile(
-        "bench",
-        # [assumption] a hand-eye calibration with bundle adjustment on a rigid bench (the lab publishes no residuals).
-        head=ExtrinsicErrors(rotation=np.deg2rad(0.5), translation=(0.003, 0.006)),
-        palm=ExtrinsicErrors(rotation=np.deg2rad(0.25), translation=(0.0, 0.001), reference=0.1),
-        depth=D400,
-        # [assumption] what a factory calibration leaves at another temperature; no maker publishes it.
-        focal=0.002,
-        principal=1.0,
-        colour_noise=1.0,
-        # [C] 0.009 rad puts the hand 10 mm off on average; [assumption] that a kinematic calibration reaches that,
-        # which is the authors' 9 mm in simulation.
-        arm_offset=0.009,
-        leg_offset=0.005,
-        # [C] one period of the 500 Hz command stream.
-        actuator_delay=0.002,
-        motors=MOTORS,
-        # [assumption] dry friction of planetary gears of that torque; nobody publishes it, and no two joints are alike.
-        leg_friction=(0.3, 2.0),
-        arm_friction=(0.1, 0.8),
-        imu=IMU,
-        # [paper] sway while standing in their simulation: 0.10 mm radial RMS. [assumption] the same in the hoist.
-        hoist_sway=0.0001,
-    ),
-    "field": RealismProfile(
-        "field",
-        # [paper] single-shot detection through head calibration and depth is off by 5 cm or more. [assumption] split
-        # as 2 deg and 20 to 30 mm; their isotropic draws give 36 mm at 1 m (median, 17 % above 5 cm) [C], so the
-        # paper's bound decides: draws below it are rejected, which leaves 55 mm (median; 95 % below 66 mm) [C].
-        head=ExtrinsicErrors(rotation=np.deg2rad(2.0), translation=(0.020, 0.030), min_error=0.05),
-        # [assumption] a printed bracket and a hand-eye calibration: 0.5 deg and 2 mm, 2.2 mm at 100 mm [C].
-        palm=ExtrinsicErrors(rotation=np.deg2rad(0.5), translation=(0.001, 0.003), reference=0.1),
-        depth=D400,
-        # [assumption] what a factory calibration leaves at another temperature; no maker publishes it.
-        focal=0.002,
-        principal=1.0,
-        colour_noise=1.0,
-        # [authors] mean reach error 35 mm on the robot against 9 mm in simulation: 34 mm of the robot's own. [C] the
-        # hand moves 1.11 m per rad of equal, independent offset in torso and arm (mean over 3000 postures before the
-        # chest), so 0.0306 rad. [assumption] that all of it is encoder zero.
-        arm_offset=0.0306,
-        # [assumption] legs are zeroed with the vendor's jig; no figure exists.
-        leg_offset=0.010,
-        # [C] one period of the command stream and one of the motor bus.
-        actuator_delay=0.004,
-        motors=MOTORS,
-        # [assumption] dry friction of planetary gears of that torque; nobody publishes it, and no two joints are alike.
-        leg_friction=(0.3, 2.0),
-        arm_friction=(0.1, 0.8),
-        imu=IMU,
-        # [assumption] half of the standing robot's 4.6 mm radial RMS [paper]; nobody published that of the hoisted one.
-        hoist_sway=0.0023,
-    ),
+    name: fill(f"key of {name}", RealismProfile, {"name": name, **rows})
+    for name, rows in load_data(__package__, "profiles.yaml").items()
 }
-"""Every profile by name."""
-
-
+"""Every profile by name; `profiles.yaml`, beside this file, names the source of each number."""
+D400 = PROFILES["field"].depth
+"""What a RealSense's depth gets wrong."""
 OF_A_FILE = ("arm_offset", "leg_offset", "zeros", "actuator_delay", "motors", "leg_friction", "arm_friction")
 """What a file may say of one robot: what `golem identify` finds."""
 
