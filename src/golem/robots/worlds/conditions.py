@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 
 from golem.errors import ConfigError, unknown_name
+from golem.package_data import load_data
 from golem.robots.sensors.streams import stream
 from golem.robots.worlds.layout import PackLayout
 from golem.types import SIDES, Side
@@ -23,23 +24,10 @@ LayoutKind = Literal["nominal", "varied"]
 Finish = Literal["zinc", "black_oxide", "brass", "rust"]
 FINISHES: tuple[Finish, ...] = ("zinc", "black_oxide", "brass", "rust")
 Coat = Literal["grey", "black", "white", "blue", "green", "bare"]
-COATS: dict[Coat, tuple[float, float, float]] = {
-    "grey": (0.30, 0.33, 0.37),
-    "black": (0.08, 0.08, 0.09),
-    "white": (0.80, 0.81, 0.80),
-    "blue": (0.14, 0.24, 0.42),
-    "green": (0.16, 0.34, 0.22),
-    "bare": (0.62, 0.64, 0.66),
-}
+_DATA = load_data(__package__, "worlds.yaml")
+COATS: dict[Coat, tuple[float, float, float]] = {name: tuple(colour) for name, colour in _DATA["coats"].items()}
 """Colours of the pack's cover (r, g, b); `grey` is the nominal one."""
-TRAYS: dict[str, tuple[float, float, float]] = {
-    "teal": (0.05, 0.55, 0.50),
-    "red": (0.65, 0.10, 0.08),
-    "yellow": (0.90, 0.72, 0.08),
-    "grey": (0.45, 0.46, 0.48),
-    "black": (0.07, 0.07, 0.08),
-    "white": (0.88, 0.88, 0.86),
-}
+TRAYS: dict[str, tuple[float, float, float]] = {name: tuple(colour) for name, colour in _DATA["trays"].items()}
 """Colours of the tray (r, g, b); `teal` is the nominal one."""
 REACH_Y = 0.35
 """Near-edge fasteners up to this far from the pack's middle may be loose in a varied work place [m]: what an arm at
@@ -93,20 +81,7 @@ class Conditions:
     clutter: float = 0.0
 
 
-RANGES: dict[str, tuple[float, float]] = {
-    "pack_x": (-0.04, 0.05),
-    "pack_y": (-0.08, 0.08),
-    "pack_yaw": (-0.15, 0.15),
-    "height": (-0.05, 0.05),
-    "tray_x": (-0.03, 0.05),
-    "tray_y": (-0.04, 0.10),
-    "tray_yaw": (-0.5, 0.5),
-    "loose": (0.25, 0.75),
-    "missing": (0.0, 0.4),
-    "light": (0.15, 2.5),
-    "light_azimuth": (-math.pi, math.pi),
-    "clutter": (0.0, 6.0),
-}
+RANGES: dict[str, tuple[float, float]] = {name: tuple(row["range"]) for name, row in _DATA["conditions"].items()}
 """Ranges of a varied work place; uniform, the light's in its logarithm."""
 HEIGHTS = dict.fromkeys(("ioniq5", "ioniq5_plant"), (-0.107, 0.203))
 """Range of `height` at a real pack: its rim is 0.75 to 1.06 m over the floor."""
@@ -116,20 +91,7 @@ CHOICES: dict[str, tuple[str, ...]] = {
     "cover": tuple(COATS),
     "tray": tuple(TRAYS),
 }
-BOUNDS: dict[str, tuple[float, float]] = {
-    "pack_x": (-0.2, 0.5),
-    "pack_y": (-0.5, 0.5),
-    "pack_yaw": (-0.8, 0.8),
-    "height": (-0.4, 0.3),
-    "tray_x": (-0.1, 0.6),
-    "tray_y": (-0.3, 0.6),
-    "tray_yaw": (-math.pi, math.pi),
-    "loose": (0.0, 1.0),
-    "missing": (0.0, 1.0),
-    "light": (0.01, 20.0),
-    "light_azimuth": (-math.pi, math.pi),
-    "clutter": (0.0, 40.0),
-}
+BOUNDS: dict[str, tuple[float, float]] = {name: tuple(row["bounds"]) for name, row in _DATA["conditions"].items()}
 """What may be asked for."""
 PLACES = ("pack_x", "pack_y", "pack_yaw", "tray_side", "tray_x", "tray_y", "tray_yaw")
 """The conditions that move pack or tray sideways, or turn them."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
+from golem.package_data import load_data
 from golem.robots.model.spatial import rotation_rpy
 from golem.robots.worlds.conditions import COATS, TRAYS, Conditions, Finish
 from golem.robots.worlds.hall import HERE, MATERIALS
@@ -13,10 +14,7 @@ from golem.types import PlanarPose
 Surface = tuple[tuple[float, float, float], float, float]
 """Colour (r, g, b), specular, shininess."""
 SURFACES: dict[Finish, Surface] = {
-    "zinc": ((0.80, 0.81, 0.83), 0.9, 0.7),
-    "black_oxide": ((0.09, 0.09, 0.10), 0.5, 0.5),
-    "brass": ((0.72, 0.56, 0.24), 0.9, 0.6),
-    "rust": ((0.36, 0.20, 0.12), 0.1, 0.1),
+    name: (tuple(colour), *rest) for name, (colour, *rest) in load_data(__package__, "worlds.yaml")["finishes"].items()
 }
 MIRRORS = ("zinc", "steel", "copper", "aluminium")
 """Materials that stereo depth loses in part: metals with a smooth surface."""

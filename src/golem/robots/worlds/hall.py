@@ -5,31 +5,13 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
+from golem.package_data import load_data
 from golem.robots.worlds import parts
 from golem.robots.worlds.layout import yaw_quat
 from golem.types import PlanarPose
 
-MATERIALS: dict[str, tuple[tuple[float, float, float, float], float, float, float]] = {
-    # name: rgba, specular, shininess, reflectance
-    "zinc": ((0.80, 0.81, 0.83, 1.0), 0.9, 0.7, 0.0),
-    "steel": ((0.55, 0.56, 0.58, 1.0), 0.8, 0.6, 0.0),
-    "aluminium": ((0.70, 0.72, 0.74, 1.0), 0.5, 0.4, 0.0),
-    "cover_coat": ((0.30, 0.33, 0.37, 1.0), 0.35, 0.35, 0.0),
-    "cover_bead": ((0.34, 0.37, 0.41, 1.0), 0.45, 0.4, 0.0),
-    "dark": ((0.07, 0.07, 0.08, 1.0), 0.1, 0.1, 0.0),
-    "hole_dark": ((0.03, 0.03, 0.035, 1.0), 0.0, 0.0, 0.0),
-    "module_black": ((0.13, 0.14, 0.16, 1.0), 0.3, 0.3, 0.0),
-    "module_cap": ((0.20, 0.22, 0.25, 1.0), 0.3, 0.3, 0.0),
-    "copper": ((0.80, 0.43, 0.22, 1.0), 0.9, 0.6, 0.0),
-    "hv_orange": ((0.96, 0.42, 0.04, 1.0), 0.4, 0.4, 0.0),
-    "stand_blue": ((0.10, 0.28, 0.52, 1.0), 0.4, 0.4, 0.0),
-    "rubber": ((0.06, 0.06, 0.06, 1.0), 0.1, 0.1, 0.0),
-    "tray_teal": ((0.05, 0.55, 0.50, 1.0), 0.3, 0.3, 0.0),
-    "wall_paint": ((0.86, 0.88, 0.90, 1.0), 0.0, 0.0, 0.0),
-    "wall_band": ((0.16, 0.36, 0.58, 1.0), 0.0, 0.0, 0.0),
-    "warning_yellow": ((0.98, 0.80, 0.05, 1.0), 0.2, 0.2, 0.0),
-    "label_white": ((0.93, 0.93, 0.92, 1.0), 0.1, 0.1, 0.0),
-}
+MATERIALS: dict[str, tuple[list[float], float, float, float]] = load_data(__package__, "worlds.yaml")["materials"]
+"""By name: colour with opacity, specular, shininess, reflectance."""
 
 FLOOR_FRICTION = 1.0
 """Sliding friction of the floor."""

@@ -7,14 +7,11 @@ from collections.abc import Callable
 import mujoco
 import numpy as np
 
+from golem.package_data import load_data
 from golem.robots.worlds import parts
 
-KINDS: dict[str, tuple[float, float]] = {
-    "mug": (0.045, 0.10),
-    "bowl": (0.08, 0.06),
-    "can": (0.034, 0.12),
-    "bottle": (0.035, 0.22),
-}
+_DATA = load_data(__package__, "worlds.yaml")["tableware"]
+KINDS: dict[str, tuple[float, float]] = {kind: tuple(row["size"]) for kind, row in _DATA.items()}
 """What may be asked for: radius and height [m]."""
 WALL = 0.004
 """Thickness of a mug's and a bowl's wall [m]."""
@@ -22,13 +19,10 @@ FACETS = 14
 """Boxes that a round wall is made of."""
 FOOT = 0.002
 """Radius of the balls that a mug stands on [m]."""
-MASSES = {"mug": 0.32, "bowl": 0.35, "can": 0.35, "bottle": 0.52}
-"""Of a mug and a bowl of stoneware, of a full can and a full bottle of water [kg]."""
-COLOURS: dict[str, tuple[tuple[float, float, float], ...]] = {
-    "mug": ((0.82, 0.22, 0.18), (0.93, 0.92, 0.88), (0.12, 0.33, 0.52), (0.95, 0.75, 0.20)),
-    "bowl": ((0.90, 0.88, 0.82), (0.28, 0.48, 0.42), (0.55, 0.36, 0.60)),
-    "can": ((0.75, 0.08, 0.10), (0.10, 0.45, 0.22), (0.85, 0.45, 0.05), (0.10, 0.20, 0.55)),
-    "bottle": ((0.45, 0.68, 0.85), (0.30, 0.60, 0.42), (0.72, 0.78, 0.82)),
+MASSES: dict[str, float] = {kind: row["mass"] for kind, row in _DATA.items()}
+"""Of a thing of stoneware, or full [kg]."""
+COLOURS: dict[str, list[tuple[float, float, float]]] = {
+    kind: [tuple(c) for c in row["colours"]] for kind, row in _DATA.items()
 }
 """What they may look like (r, g, b)."""
 _BOX = mujoco.mjtGeom.mjGEOM_BOX
