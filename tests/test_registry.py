@@ -220,7 +220,7 @@ def test_every_shipped_module_is_one_of_its_slot(slot: str) -> None:
     for use in registry.names(slot):
         if use == "pink_ik":
             pytest.importorskip("pink")
-        registry.check(slot, use, {**OPTIONS.get((slot, use), {}), **NEEDED.get(use, {})})
+        registry.check(slot, use, {**OPTIONS.get(slot, {}).get(use, {}), **NEEDED.get(use, {})})
 
 
 NEEDED: dict[str, dict[str, object]] = {

@@ -42,7 +42,7 @@ def test_every_slot_has_a_suite_whose_promises_are_sentences() -> None:
         pytest.param(slot, use, marks=LONG.get(use, ()))
         for slot in SUITES
         for use in registry.names(slot)
-        if (slot, use) not in UNCHECKED
+        if use not in UNCHECKED.get(slot, ())
     ],
 )
 def test_every_shipped_module_keeps_its_promises(slot: str, use: str) -> None:

@@ -6,18 +6,9 @@ import re
 from collections.abc import Iterable
 from functools import lru_cache
 
-SYNONYMS: dict[str, tuple[str, ...]] = {
-    "bottle": ("flask", "water", "bottled water", "drink"),
-    "bowl": ("dish", "basin"),
-    "bus_bar": ("busbar", "conductor"),
-    "can": ("tin", "soda", "coke"),
-    "handle": ("grip",),
-    "mug": ("cup", "coffee"),
-    "nut": ("hex nut",),
-    "screw": ("bolt", "fastener", "loose screw"),
-    "screw_hole": ("hole", "bore"),
-    "tray": ("bin", "container", "box"),
-}
+from golem.package_data import load_data
+
+SYNONYMS: dict[str, list[str]] = load_data(__package__, "synonyms.yaml")
 """Label -> other words for it."""
 SAME, SYNONYM, WITHIN = 1.0, 0.9, 0.7
 """Scores of a query that is the label, another word for it, or a phrase with one of both in it."""

@@ -6,19 +6,9 @@ from dataclasses import dataclass, field
 
 from golem.capabilities.properties.base import Properties
 from golem.errors import ConfigError, unknown_name
+from golem.package_data import load_data
 
-KNOWN: dict[str, tuple[float, float, float]] = {
-    "mug": (0.35, 0.5, 2e5),
-    "bowl": (0.40, 0.5, 1e5),
-    "can": (0.38, 0.4, 2e4),
-    "bottle": (0.60, 0.5, 5e3),
-    "screw": (0.02, 0.3, 1e6),
-    "nut": (0.01, 0.3, 1e6),
-    "egg": (0.06, 0.4, 5e3),
-    "tomato": (0.12, 0.5, 1.5e3),
-    "paper_cup": (0.15, 0.5, 5e2),
-    "sponge": (0.02, 0.8, 3e2),
-}
+KNOWN: dict[str, list[float]] = load_data(__package__, "things.yaml")
 """Mass [kg], friction on rubber, stiffness [N/m] of full or whole things as they are sold: estimates, not measured."""
 
 

@@ -28,6 +28,7 @@ from golem.evaluation.conformance.base import (
 from golem.evaluation.conformance.suite import Suite
 from golem.evaluation.no_search import searching_forbidden
 from golem.options import check_values, read_yaml
+from golem.package_data import load_data
 from golem.traces import caller
 
 LIMIT = 120.0
@@ -66,41 +67,13 @@ def cpu_limit() -> Generator[None, None, None]:
         signal.signal(signal.SIGPROF, before)
 
 
-_HERE = "golem.evaluation.conformance"
-SUITES: dict[str, str] = {
-    "robot": f"{_HERE}.robot_suite:RobotSuite",
-    "estimator": f"{_HERE}.estimator_suite:EstimatorSuite",
-    "servo": f"{_HERE}.servo_suite:ServoSuite",
-    "hand": f"{_HERE}.hand_suite:HandSuite",
-    "lower_body": f"{_HERE}.leg_suite:LegSuite",
-    "upper_body": f"{_HERE}.arm_suite:ArmSuite",
-    "planner": f"{_HERE}.planner_suite:PlannerSuite",
-    "localizer": f"{_HERE}.localizer_suite:LocalizerSuite",
-    "grasp_method": f"{_HERE}.grasp_suite:GraspSuite",
-    "properties": f"{_HERE}.property_suite:PropertySuite",
-    "odometry": f"{_HERE}.odometry_suite:OdometrySuite",
-    "mapper": f"{_HERE}.mapper_suite:MapperSuite",
-    "memory": f"{_HERE}.memory_suite:MemorySuite",
-    "navigator": f"{_HERE}.navigator_suite:NavigatorSuite",
-    "skill": f"{_HERE}.skill_suite:SkillSuite",
-}
+_DATA = load_data(__package__, "suites.yaml")
+SUITES: dict[str, str] = _DATA["suites"]
 """Slot -> `module:Class` of its suite, imported when it is used."""
-OPTIONS: dict[tuple[str, str], Mapping[str, object]] = {
-    ("lower_body", "policy"): {"file": "almi_stand"},
-    ("navigator", "nav2"): {"near": 2000.0},
-    ("lower_body", "handover"): {"walk": {"use": "almi"}, "stand": {"use": "hold"}},
-}
-"""What shipped modules without default options are checked with."""
-UNCHECKED: dict[tuple[str, str], str] = {
-    ("localizer", "gemini"): "it asks a service: golem check localizer gemini, with your key",
-    ("localizer", "grounding_dino"): "it needs weights: golem check localizer '{use: grounding_dino, weights: FILE}'",
-    ("localizer", "owlv2"): "it needs weights: golem check localizer '{use: owlv2, weights: FILE}'",
-    ("localizer", "yolo_world"): "it needs weights: golem check localizer '{use: yolo_world, weights: FILE}'",
-    ("properties", "gemini"): "it asks a service: golem check properties gemini, with your key",
-    ("grasp_method", "graspgen"): "it needs a server: golem check grasp_method '{use: graspgen, host: HOST}'",
-    ("robot", "replay"): "it needs a recording: golem check robot '{use: replay, file: BAG}'",
-}
-"""Shipped modules that `golem check` leaves out where it is not asked for them, and why."""
+OPTIONS: dict[str, dict[str, Mapping[str, object]]] = _DATA["options"]
+"""Slot -> name -> what a shipped module without default options is checked with."""
+UNCHECKED: dict[str, dict[str, str]] = _DATA["unchecked"]
+"""Slot -> name -> why `golem check` leaves a shipped module out where it is not asked for it."""
 
 
 def suite_of(slot: str) -> Suite:
@@ -137,7 +110,7 @@ def candidate(slot: str, use: str) -> Candidate:
     """
     suite = suite_of(slot)
     name, options = choice_of(use)
-    options = options or OPTIONS.get((slot, name), {})
+    options = options or OPTIONS.get(slot, {}).get(name, {})
     registry.load(slot, name)
     make = functools.partial(_make, suite, slot, name, options)
     return Candidate(slot, name, make)

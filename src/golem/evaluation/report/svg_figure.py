@@ -9,6 +9,7 @@ from typing import Any
 
 from golem.errors import MissingExtra
 from golem.figures import blank_figure
+from golem.package_data import load_data
 
 WIDTH = 900.0
 """Width of a figure over the whole page [px]; the page scales it."""
@@ -16,29 +17,7 @@ _NAMES = ("ink", "muted", "line", "track", "won", "lost", *(f"m{i}" for i in ran
 COLOUR = {name: f"#0000{i + 1:02x}" for i, name in enumerate(_NAMES)}
 """Variable of the style sheet -> the colour that stands for it in a figure."""
 _VARIABLE = {code: f"var(--{name})" for name, code in COLOUR.items()}
-_STYLE: dict[Any, Any] = {
-    "svg.fonttype": "none",
-    "text.color": COLOUR["ink"],
-    "axes.labelcolor": COLOUR["muted"],
-    "axes.edgecolor": COLOUR["line"],
-    "axes.titlecolor": COLOUR["muted"],
-    "axes.titlelocation": "left",
-    "axes.titlesize": 9,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.axisbelow": True,
-    "axes.grid": True,
-    "axes.unicode_minus": True,
-    "grid.color": COLOUR["line"],
-    "grid.linewidth": 0.8,
-    "xtick.color": COLOUR["muted"],
-    "ytick.color": COLOUR["muted"],
-    "xtick.labelcolor": COLOUR["muted"],
-    "ytick.labelcolor": COLOUR["ink"],
-    "ytick.major.size": 0,
-    "font.size": 9,
-    "legend.frameon": False,
-}
+_STYLE = {key: COLOUR.get(value, value) for key, value in load_data(__package__, "figure.yaml").items()}
 
 
 def method_colour(i: int) -> str:

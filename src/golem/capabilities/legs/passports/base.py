@@ -15,6 +15,7 @@ from golem.capabilities.legs.base import Envelope
 from golem.capabilities.legs.description import Description
 from golem.capabilities.legs.observation import TERMS, Term
 from golem.errors import ConfigError, shorten, unknown_name
+from golem.package_data import load_data
 from golem.robots.model.table import JOINT_INDEX, JOINT_NAMES
 from golem.types import LEGS, NUM_JOINTS
 
@@ -23,27 +24,11 @@ ASSUMED_TWISTS = Envelope((-0.5, 0.8), (-0.3, 0.3), (-0.5, 0.5))
 PERIOD = 0.8
 """Period of a gait clock that a policy sees and does not describe [s]: unitree_rl_gym's."""
 
-WORDS: dict[str, str] = {
-    "base_lin_vel": "base_velocity",
-    "base_ang_vel": "base_rate",
-    "projected_gravity": "gravity",
-    "velocity_commands": "twist",
-    "generated_commands": "twist",
-    "keyboard_velocity_commands": "twist",
-    "command": "twist",
-    "twist": "twist",
-    "joint_pos_rel": "joint_position",
-    "joint_pos": "joint_angle",
-    "joint_vel_rel": "joint_velocity",
-    "joint_vel": "joint_velocity",
-    "last_action": "last_action",
-    "actions": "last_action",
-    "gait_phase": "phase",
-    "phase": "phase",
-    "root_quat_w": "orientation",
-    "base_quat": "orientation",
-}
+_DATA = load_data(__package__, "words.yaml")
+WORDS: dict[str, str] = _DATA["words"]
 """Observation terms of Isaac Lab, mjlab and Unitree, and the term of ours that each is."""
+KEYS_OF: dict[str, dict[str, str]] = _DATA["keys"]
+"""By format: where in its file a field of the description stands; see `Passport.keys`."""
 CONSTANTS: dict[str, float] = {"height_command": 0.98, "base_height_command": 0.98, "posture_command": 0.0}
 """Commands that do not exist here, and what a policy sees instead: standing height of base_link [m], no lean."""
 FOLLOWERS = ("motion_anchor_pos_b", "motion_anchor_ori_b", "motion_command", "robot_body_pos_b")

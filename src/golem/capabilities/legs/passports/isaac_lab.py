@@ -11,6 +11,7 @@ from golem.capabilities.legs.gait import GaitConfig
 from golem.capabilities.legs.observation import Term
 from golem.capabilities.legs.passports.base import (
     ASSUMED_TWISTS,
+    KEYS_OF,
     PERIOD,
     Passport,
     at,
@@ -29,16 +30,7 @@ from golem.types import LEGS
 NAME = "Isaac Lab's IO descriptors"
 MARK = "articulations"
 """A key that only this format has."""
-KEYS = {
-    "joints": "joint_names",
-    "posture": "default_joint_pos",
-    "kp": "default_joint_stiffness",
-    "kd": "default_joint_damping",
-    "rate": "dt",
-    "action.scale": "scale",
-    "action.targets": "clip",
-    "history": "history_length",
-}
+KEYS = KEYS_OF["isaac_lab"]
 
 
 def read(path: Path, data: Mapping[str, Any], network: Path | None) -> Passport:

@@ -10,6 +10,7 @@ from golem.capabilities.legs.gait import GaitConfig
 from golem.capabilities.legs.network import onnx_session
 from golem.capabilities.legs.passports.base import (
     ASSUMED_TWISTS,
+    KEYS_OF,
     PERIOD,
     Passport,
     by_motor,
@@ -22,16 +23,7 @@ from golem.errors import ConfigError
 
 NAME = "ONNX with metadata (mjlab, BeyondMimic)"
 NEEDED = ("joint_names", "joint_stiffness", "joint_damping", "default_joint_pos", "action_scale", "observation_names")
-KEYS = {
-    "joints": "metadata joint_names",
-    "posture": "metadata default_joint_pos",
-    "kp": "metadata joint_stiffness",
-    "kd": "metadata joint_damping",
-    "action.scale": "metadata action_scale",
-    "history": "metadata observation_terms_history_length",
-    "observation": "metadata observation_names",
-    "twist": "metadata observation_names",
-}
+KEYS = KEYS_OF["onnx_metadata"]
 
 
 def read(path: Path, network: Path | None) -> Passport:

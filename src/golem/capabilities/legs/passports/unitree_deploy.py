@@ -11,6 +11,7 @@ from golem.capabilities.legs.description import ActionScaling, Description
 from golem.capabilities.legs.gait import GaitConfig
 from golem.capabilities.legs.observation import HistoryOrder, Term
 from golem.capabilities.legs.passports.base import (
+    KEYS_OF,
     PERIOD,
     Passport,
     at,
@@ -28,18 +29,7 @@ from golem.types import LEGS
 NAME = "Unitree's deploy.yaml"
 MARK = "joint_ids_map"
 """A key that only this format has."""
-KEYS = {
-    "joints": MARK,
-    "posture": "default_joint_pos",
-    "kp": "stiffness",
-    "kd": "damping",
-    "rate": "step_dt",
-    "action.scale": "scale",
-    "action.targets": "clip",
-    "history": "history_length",
-    "envelope": "ranges",
-    "gait": "period",
-}
+KEYS = KEYS_OF["unitree_deploy"]
 
 
 def read(path: Path, data: Mapping[str, Any], network: Path | None) -> Passport:

@@ -10,7 +10,7 @@ from golem.capabilities.legs.base import Envelope
 from golem.capabilities.legs.description import ActionScaling, Description
 from golem.capabilities.legs.gait import GaitConfig
 from golem.capabilities.legs.observation import Term
-from golem.capabilities.legs.passports.base import ASSUMED_TWISTS, PERIOD, Passport, at, first_file, numbers
+from golem.capabilities.legs.passports.base import ASSUMED_TWISTS, KEYS_OF, PERIOD, Passport, at, first_file, numbers
 from golem.errors import ConfigError
 from golem.robots.model.table import JOINT_NAMES
 from golem.types import LEGS
@@ -18,19 +18,7 @@ from golem.types import LEGS
 NAME = "unitree_rl_gym's deployment YAML"
 MARK = "num_obs"
 """A key that only this format has."""
-KEYS = {
-    "joints": "leg_joint2motor_idx",
-    "posture": "default_angles",
-    "kp": "kps",
-    "kd": "kds",
-    "rate": "control_dt",
-    "action.scale": "action_scale",
-    "envelope": "max_cmd",
-    "0": "ang_vel_scale",
-    "2": "cmd_scale",
-    "3": "dof_pos_scale",
-    "4": "dof_vel_scale",
-}
+KEYS = KEYS_OF["unitree_gym"]
 
 
 def read(path: Path, data: Mapping[str, Any], network: Path | None) -> Passport:
