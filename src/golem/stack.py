@@ -182,6 +182,13 @@ class Stack:
         choice = value if isinstance(value, Choice) else _choice(f"'{use}'", key, KEYS[key].slot, value)
         return replace(self, choices={**self.choices, key: choice})
 
+    def with_choices(self, choices: Mapping[str, str]) -> Stack:
+        """Return a copy with other implementations, by key; see `with_choice`."""
+        stack = self
+        for key, use in choices.items():
+            stack = stack.with_choice(key, use)
+        return stack
+
     def with_options(self, key: str, **options: object) -> Stack:
         """Return a copy in which some options of the implementation under `key` are others."""
         old = self.choice(key)

@@ -17,6 +17,7 @@ from typing import Any, ClassVar, Generic, TypeVar, cast
 
 import numpy as np
 
+from golem import registry
 from golem.errors import unknown_name
 from golem.evaluation.metrics.text_table import TextTable
 from golem.evaluation.rung_table import PROFILES, RUNGS
@@ -144,6 +145,7 @@ class Rung(ABC, Generic[O]):
             Elsewhere they are conditions under which methods are compared.
         provokes: whether it shoves or harms robots until they are lost, so that a stop may be right.
         timed: whether it measures the machine, so that nothing may run at the same time as a trial.
+        slot: what its methods are, where they are modules.
         options: the options of this one.
         onlooker: who is shown the stacks of its trials: a viewer, or on a ladder what films the lost ones.
     """
@@ -157,6 +159,7 @@ class Rung(ABC, Generic[O]):
     adaptive: bool = False
     provokes: bool = False
     timed: bool = False
+    slot: ClassVar[str] = ""
 
     def __init__(self, options: O | None = None) -> None:
         """Take the options; None are the defaults.
@@ -167,9 +170,9 @@ class Rung(ABC, Generic[O]):
         self.options: O = self.Options() if options is None else options
         self.onlooker: Onlooker | None = None
 
-    @abstractmethod
     def methods(self) -> tuple[str, ...]:
-        """Return the names of the methods that can be compared on this rung."""
+        """Return the names of the methods that can be compared: what is registered for its slot, the default ones without."""
+        return registry.names(self.slot) if self.slot else self.default_methods
 
     @abstractmethod
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
@@ -183,9 +186,8 @@ class Rung(ABC, Generic[O]):
                 is absent from this machine. It is called before anything is written.
         """
 
-    @abstractmethod
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
-        """Run one trial.
+        """Run one trial; a rung has this, or `run_together`, of its own.
 
         Args:
             spec: the trial.
@@ -195,6 +197,7 @@ class Rung(ABC, Generic[O]):
         Raises:
             golem.errors.ModuleFault: a module broke its contract; the ladder records the trial as lost by it.
         """
+        return self.run_together([spec])[0]
 
     def cases(self, results: Results) -> Sequence[Case]:
         """Return the cases that one method's trials are to be run under, as far as `results` tells yet.

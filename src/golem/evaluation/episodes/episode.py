@@ -75,9 +75,7 @@ def legs_stack(
     twin = stack.choice("robot")
     other = stack.with_choice("robot", others.pop("robot", twin)).choice("robot")
     stack = stack.with_choice("robot", Choice(other.use, {**twin.options, **other.options}))
-    for slot, use in others.items():
-        stack = stack.with_choice(slot, use)
-    return stack
+    return stack.with_choices(others)
 
 
 def episode_seed(seed: int, index: int) -> int:

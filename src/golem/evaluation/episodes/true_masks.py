@@ -127,10 +127,7 @@ def with_modules(stack: Stack, overrides: Mapping[str, str]) -> Stack:
     Raises:
         ConfigError: a slot, a name or an option is wrong.
     """
-    for slot, use in overrides.items():
-        if (slot, use) != ("localizer", USE):
-            stack = stack.with_choice(slot, use)
-    return stack
+    return stack.with_choices({slot: use for slot, use in overrides.items() if (slot, use) != ("localizer", USE)})
 
 
 def build_seeing(stack: Stack, spec: TrialSpec) -> tuple[LockstepRunner, Any]:

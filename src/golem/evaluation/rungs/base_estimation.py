@@ -6,7 +6,6 @@ import math
 import time
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -247,10 +246,6 @@ class BaseEstimation(Rung[BaseEstimationOptions]):
     def together(self, spec: TrialSpec) -> Hashable:
         """Return what trials share that read the same recording."""
         return spec.index, spec.case["condition"] == PUSHED
-
-    def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
-        """Run one trial; see `Rung`."""
-        return self.run_together([spec])[0]
 
     def run_together(self, specs: Sequence[TrialSpec]) -> Sequence[TrialOutcome]:
         """Record one walk, and let estimators follow it."""

@@ -51,19 +51,13 @@ def judge_hands(stack: Stack, seed: int, head: Calibration, views: int, method: 
             names = [f"{side}_hand" for side in SIDES]
             before = max(point_moved(robot.calibration[name], HAND_AHEAD) for name in names)
         if not result.success:
-            return TrialOutcome(False, result.stage, result.slot, result.reason, result.timings)
+            return _failed(result)
         found = read_calibration(file)
     after = max(found.moved(name, HAND_AHEAD) for name in names)
     deviation = max(found.moved_sigma(name, HAND_AHEAD) for name in names)
-    good = after <= HAND_GOOD
-    return TrialOutcome(
-        good,
-        DONE if good else "fit",
-        None if good else f"skill: {method}",
-        f"Palm cameras {before * 1e3:.1f} -> {after * 1e3:.2f} mm at 0.1 m.",
-        result.timings,
-        {"before": before, "after": after, "sigma": deviation},
-    )
+    words = f"Palm cameras {before * 1e3:.1f} -> {after * 1e3:.2f} mm at 0.1 m."
+    series = {"before": before, "after": after, "sigma": deviation}
+    return _fitted(after <= HAND_GOOD, method, words, series, result.timings)
 
 
 def judge_lidar(stack: Stack, seed: int, head: Calibration, method: str) -> TrialOutcome:
@@ -76,27 +70,35 @@ def judge_lidar(stack: Stack, seed: int, head: Calibration, method: str) -> Tria
             result = running.execute(LIDAR_SKILL, {"file": file.name})
         found = read_calibration(file).lidar
     if found is None:
-        return TrialOutcome(False, result.stage, result.slot, result.reason, result.timings)
+        return _failed(result)
     true = draw_mount(stack.profile, seed)
     left = LidarMount(np.asarray(np.linalg.solve(true, found.pose), np.float64), found.covariance)
     before, after = LidarMount(true, found.covariance).moved(LIDAR_AWAY), left.moved(LIDAR_AWAY)
-    good = after <= LIDAR_GOOD
+    words = f"LiDAR {before * 1e3:.0f} -> {after * 1e3:.1f} mm at {LIDAR_AWAY:g} m."
+    series = {
+        "before": before,
+        "after": after,
+        "sigma": left.moved_sigma(LIDAR_AWAY),
+        "angle_before": _angle(true),
+        "angle_after": _angle(left.pose),
+        "distance_before": float(np.linalg.norm(true[:3, 3])),
+        "distance_after": float(np.linalg.norm(left.pose[:3, 3])),
+    }
+    return _fitted(after <= LIDAR_GOOD, method, words, series, result.timings)
+
+
+def _fitted(
+    good: bool, method: str, words: str, series: Mapping[str, float], timings: Mapping[str, float] | None = None
+) -> TrialOutcome:
+    """Return the outcome of a calibration that came to an end."""
     return TrialOutcome(
-        good,
-        DONE if good else "fit",
-        None if good else f"skill: {method}",
-        f"LiDAR {before * 1e3:.0f} -> {after * 1e3:.1f} mm at {LIDAR_AWAY:g} m.",
-        result.timings,
-        {
-            "before": before,
-            "after": after,
-            "sigma": left.moved_sigma(LIDAR_AWAY),
-            "angle_before": _angle(true),
-            "angle_after": _angle(left.pose),
-            "distance_before": float(np.linalg.norm(true[:3, 3])),
-            "distance_after": float(np.linalg.norm(left.pose[:3, 3])),
-        },
+        good, DONE if good else "fit", None if good else f"skill: {method}", words, timings or {}, series
     )
+
+
+def _failed(result: SkillResult) -> TrialOutcome:
+    """Return the outcome of a calibration that did not."""
+    return TrialOutcome(False, result.stage, result.slot, result.reason, result.timings)
 
 
 def _angle(T: Array) -> float:
@@ -148,10 +150,6 @@ class CalibrationRung(Rung[CalibrationOptions]):
     Options = CalibrationOptions
     default_methods = (SKILL,)
 
-    def methods(self) -> tuple[str, ...]:
-        """Return the one shipped skill; one's own may be named."""
-        return (SKILL,)
-
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
         """Return what determines a trial besides its seed; see `Rung`."""
         return stack_facts(tagged_stack(profile, overrides))
@@ -166,7 +164,7 @@ class CalibrationRung(Rung[CalibrationOptions]):
         seed = episode_seed(spec.seed, spec.index)
         found = calibrate(stack, seed, self.options.views, self.options.keep)
         if isinstance(found, SkillResult):
-            return TrialOutcome(False, found.stage, found.slot, found.reason, found.timings)
+            return _failed(found)
         if spec.case["what"] == "hand":
             return judge_hands(stack, seed, found, self.options.views, spec.method)
         if spec.case["what"] == "lidar":
@@ -182,16 +180,8 @@ class CalibrationRung(Rung[CalibrationOptions]):
                 float(found.views),
                 found.residual,
             )
-        good = values[1] <= GOOD
-        series: dict[str, float] = dict(zip(ERRORS, values, strict=True))
-        return TrialOutcome(
-            good,
-            DONE if good else "fit",
-            None if good else f"skill: {spec.method}",
-            f"Head camera {values[0] * 1e3:.0f} -> {values[1] * 1e3:.1f} mm at 1 m.",
-            {},
-            series,
-        )
+        words = f"Head camera {values[0] * 1e3:.0f} -> {values[1] * 1e3:.1f} mm at 1 m."
+        return _fitted(values[1] <= GOOD, spec.method, words, dict(zip(ERRORS, values, strict=True)))
 
 
 class CalibratedTether(PickRung):
@@ -211,7 +201,7 @@ class CalibratedTether(PickRung):
         seed = episode_seed(spec.seed, spec.index)
         found = calibrate(tagged_stack(spec.profile, {}), seed, self._how.views, self._how.keep)
         if isinstance(found, SkillResult):
-            return TrialOutcome(False, found.stage, found.slot, found.reason, found.timings)
+            return _failed(found)
         with tempfile.TemporaryDirectory() as folder:
             self._file = Path(folder) / "calibration.json"
             found.save(self._file)
@@ -223,9 +213,7 @@ class CalibratedTether(PickRung):
     def _stack(self, method: str, profile: str, overrides: Mapping[str, str]) -> Stack:
         if SLOT in overrides:
             raise ConfigError(f"The method is what sits in {SLOT}; leave out --use {SLOT}=...")
-        stack = load_stack(STACK, profile=profile).with_choice(SLOT, method)
-        for slot, use in overrides.items():
-            stack = stack.with_choice(slot, use)
+        stack = load_stack(STACK, profile=profile).with_choice(SLOT, method).with_choices(overrides)
         return stack if self._file is None else stack.with_part("calibration", file=str(self._file))
 
 
@@ -255,9 +243,7 @@ def tagged_stack(profile: str, overrides: Mapping[str, str]) -> Stack:
     Raises:
         ConfigError: an override is wrong, or brings another robot.
     """
-    stack = load_stack(STACK, profile=profile)
-    for slot, use in overrides.items():
-        stack = stack.with_choice(slot, use)
+    stack = load_stack(STACK, profile=profile).with_choices(overrides)
     if not issubclass(registry.load("robot", stack.choice("robot").use), MujocoRobot):
         raise ConfigError("This rung judges on the simulator's truth; leave out --use robot=...")
     return stack.with_options("robot", tags=True, world="open")

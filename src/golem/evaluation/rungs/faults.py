@@ -9,7 +9,6 @@ from collections.abc import Hashable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 from golem.errors import ConfigError, unknown_name
@@ -78,10 +77,6 @@ class FaultsRung(Rung[FaultOptions]):
         if not self.faults:
             raise ConfigError(f"No fault has '{self.options.only}' in its name; golem faults --help lists none.")
 
-    def methods(self) -> tuple[str, ...]:
-        """Return the one there is."""
-        return (GATE,)
-
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
         """Return what determines a trial; see `Rung`."""
         return {posture: stack_facts(self.stack(posture, profile, overrides)) for posture in self.options.posture}
@@ -89,10 +84,8 @@ class FaultsRung(Rung[FaultOptions]):
     def stack(self, posture: str, profile: str, overrides: Mapping[str, str]) -> Stack:
         """Return the stack of a robot in `posture`: one of the shipped, on an open floor."""
         name = "tether" if posture == "hanging" else "stand"
-        stack = load_stack(name, profile=profile).with_options("robot", **{"world": "open", **POSTURES[posture]})
-        for slot, use in overrides.items():
-            stack = stack.with_choice(slot, use)
-        return stack
+        world = {"world": "open", **POSTURES[posture]}
+        return load_stack(name, profile=profile).with_options("robot", **world).with_choices(overrides)
 
     def cases(self, results: Results) -> Sequence[Case]:
         """Return every fault in every posture."""
@@ -102,10 +95,6 @@ class FaultsRung(Rung[FaultOptions]):
         """Return what trials share that have one past."""
         chunk = self.faults.index(str(spec.case["fault"])) // BATCH
         return spec.method, spec.index, spec.case["posture"], chunk
-
-    def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
-        """Run one trial; see `Rung`."""
-        return self.run_together([spec])[0]
 
     def run_together(self, specs: Sequence[TrialSpec]) -> Sequence[TrialOutcome]:
         """Bring one robot to the moment of the faults, and go on from there in a copy of the process for each."""

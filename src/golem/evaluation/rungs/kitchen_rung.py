@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Protocol, TypeVar
 
-from golem import registry
 from golem.errors import ConfigError
 from golem.evaluation.base import DONE, Rung, TrialOutcome, TrialSpec
 from golem.evaluation.episodes.episode import lost
@@ -80,7 +79,6 @@ class KitchenRung(Rung[O]):
     """One errand in a kitchen per trial.
 
     Attributes:
-        slot: what the methods are.
         subject: what the twin has to have, in the words of an error.
         stack_name: the shipped stack that it runs; empty for the one of its own name.
         balances: whether the robot stands on its own feet.
@@ -100,10 +98,6 @@ class KitchenRung(Rung[O]):
     def arranged(self, spec: TrialSpec, stack: Stack) -> Stack:
         """Return `stack` with the world as a trial needs it."""
         return stack
-
-    def methods(self) -> tuple[str, ...]:
-        """Return what is registered for the slot."""
-        return registry.names(self.slot)
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
         """Return what determines a trial besides its seed; see `Rung`."""

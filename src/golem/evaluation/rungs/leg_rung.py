@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-from golem import registry
 from golem.capabilities.legs.base import Envelope
 from golem.errors import ConfigError
 from golem.evaluation.base import DONE, Rung, TrialOutcome, TrialSpec
@@ -47,6 +46,7 @@ class LegRung(Rung[O]):
 
     Options = PlantOptions
     default_methods = ("almi",)
+    slot = "lower_body"
     twin: Mapping[str, object] = {}
     walks: bool = False
 
@@ -60,10 +60,6 @@ class LegRung(Rung[O]):
             names = getattr(self.options, option)
             if not names or len(set(names)) < len(names):
                 raise ConfigError(f"--{option} names nothing, or one of them twice.")
-
-    def methods(self) -> tuple[str, ...]:
-        """Return the registered lower bodies."""
-        return registry.names("lower_body")
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
         """Return what determines a trial besides its seed; see `Rung`."""

@@ -35,14 +35,11 @@ class MpcRate(LegRung[PlantOptions]):
     """
 
     name = "mpc-rate"
+    slot = ""  # the MPC alone; `{use: mpc, option: value}` gives it options
     default_methods = ("mpc",)
     default_n = 1
     default_profile = "bench"
     timed = True
-
-    def methods(self) -> tuple[str, ...]:
-        """Return the one lower body whose plans are timed; `{use: mpc, option: value}` gives it options."""
-        return ("mpc",)
 
     def cases(self, results: Results) -> Sequence[Case]:
         """Return the numbers of samples."""

@@ -13,7 +13,6 @@ from typing import Any, Literal
 import cv2
 import numpy as np
 
-from golem import registry
 from golem.capabilities.navigation.map_picture import GOAL, TRACK, WAY, MapPicture
 from golem.capabilities.navigation.movers import BODY
 from golem.evaluation.base import DONE, Case, Results, Rung, TrialOutcome, TrialSpec
@@ -143,11 +142,8 @@ class NavigateRung(Rung[NavigateOptions]):
     name = "navigate"
     Options = NavigateOptions
     default_methods = ("costmap_astar",)
+    slot = SLOT
     default_n = 20
-
-    def methods(self) -> tuple[str, ...]:
-        """Return the registered navigators."""
-        return registry.names(SLOT)
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
         """Return what determines a trial besides its seed; see `Rung`."""

@@ -176,10 +176,6 @@ class OdometryRung(Rung[OdometryOptions]):
         condition = _condition(spec)
         return spec.index, condition.route, condition.people
 
-    def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
-        """Run one trial; see `Rung`."""
-        return self.run_together([spec])[0]
-
     def run_together(self, specs: Sequence[TrialSpec]) -> Sequence[TrialOutcome]:
         """Let the robot walk once, and odometries hear what its sensors said under each condition."""
         first = specs[0]

@@ -230,6 +230,7 @@ class PickRung(Rung[PickOptions]):
 
     Options = PickOptions
     default_methods = ("centroid", "visual_servo")
+    slot = SLOT
 
     def __init__(self, options: PickOptions | None = None) -> None:
         """Read the sweep; see `Rung`."""
@@ -239,10 +240,6 @@ class PickRung(Rung[PickOptions]):
     def cases(self, results: Results) -> Sequence[Case]:
         """Return the values of the sweep; see `Rung`."""
         return self._sweep
-
-    def methods(self) -> tuple[str, ...]:
-        """Return the registered grasp methods."""
-        return registry.names(SLOT)
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
         """Return what determines a trial besides its seed; see `Rung`."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Hashable, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -123,13 +122,10 @@ class MemoryRung(Rung[Any]):
 
     name = "memory"
     default_methods = ("top_down_map", "frame_index", "reranked", "object_map")
+    slot = SLOT
     default_n = 20
     profiles = ("ideal",)
     default_profile = "ideal"
-
-    def methods(self) -> tuple[str, ...]:
-        """Return the memories."""
-        return registry.names(SLOT)
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
         """Return what determines a trial besides its seed; see `Rung`."""
@@ -142,10 +138,6 @@ class MemoryRung(Rung[Any]):
     def together(self, spec: TrialSpec) -> Hashable:
         """Return what trials share that see the same looks."""
         return spec.index, spec.case["condition"]
-
-    def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
-        """Run one trial; see `Rung`."""
-        return self.run_together([spec])[0]
 
     def run_together(self, specs: Sequence[TrialSpec]) -> Sequence[TrialOutcome]:
         """Render the looks once, and let memories see them."""

@@ -145,9 +145,7 @@ class VarStandRung(PickRung):
         if "robot" in overrides or "grasp_method" in overrides:
             raise ConfigError("This rung brings robot and grasp method itself; leave out --use of both.")
         stack = load_stack("hall", profile=profile).with_choice("grasp_method", method)
-        for slot, use in overrides.items():
-            stack = stack.with_choice(slot, use)
-        return stack
+        return stack.with_choices(overrides)
 
 
 class _Trial:
