@@ -171,7 +171,7 @@ class Rung(ABC, Generic[O]):
         self.onlooker: Onlooker | None = None
 
     def methods(self) -> tuple[str, ...]:
-        """Return the names of the methods that can be compared: what is registered for its slot, the default ones without."""
+        """Return the names of methods that can be compared: those registered for its slot, or the default ones."""
         return registry.names(self.slot) if self.slot else self.default_methods
 
     @abstractmethod
