@@ -163,6 +163,8 @@ PROFILES: dict[str, RealismProfile] = {
 """Every profile by name; `profiles.yaml`, beside this file, names the source of each number."""
 D400 = PROFILES["field"].depth
 """What a RealSense's depth gets wrong."""
+MOTORS = PROFILES["field"].motors
+"""What a motor's report gets wrong."""
 OF_A_FILE = ("arm_offset", "leg_offset", "zeros", "actuator_delay", "motors", "leg_friction", "arm_friction")
 """What a file may say of one robot: what `golem identify` finds."""
 
