@@ -13,7 +13,7 @@ from typing import Any, cast
 
 from golem.middleware.ros import definitions
 from golem.middleware.ros.definitions import BASE, NAME, Definition
-from golem.middleware.ros.message_class import is_numeric, numpy_name, python_name, python_type, short
+from golem.middleware.ros.message import is_numeric, numpy_name, python_name, python_type, short
 
 MSGS = definitions.SHARE.parent / "msgs"
 """Folder of what is generated."""

@@ -22,7 +22,7 @@ probe() {
         report) echo "from golem.figures import blank_figure; blank_figure(90.0, 90.0); from golem.evaluation.report.svg_figure import styled; styled()" ;;
         hardware) echo "from golem.hardware.drivers.serial_port import SerialPort; SerialPort('/dev/none', 9600)" ;;
         realsense) echo "from golem.hardware.drivers.realsense_camera import library; library()" ;;
-        vision) echo "from pathlib import Path; from golem.capabilities.perception.hub_model import load_model; load_model(Path('none'), 'clip', 'CLIPModel', 'CLIPProcessor')" ;;
+        vision) echo "from pathlib import Path; from golem.capabilities.perception.open_words import load_model; load_model(Path('none'), 'clip', 'CLIPModel', 'CLIPProcessor')" ;;
         graspgen) echo "from golem.registry import create; create('grasp_method', 'graspgen', {})" ;;
         cluster) echo "from golem.evaluation.harness.trial_executor import DaskExecutor; DaskExecutor('no scheduler')" ;;
         lidar) echo "from golem.registry import create; create('odometry', 'kiss_icp', {}); create('odometry', 'rko_lio', {})" ;;

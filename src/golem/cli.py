@@ -151,7 +151,7 @@ def _safety(words: list[str]) -> int:
     from golem.runtime.live import operator
 
     if words[:1] == ["console"]:
-        from golem.runtime.live.operator_console import run_console
+        from golem.runtime.live.operator import run_console
 
         run_console(_parse(operator.RequestConfig, "safety console", words[1:]))
         return 0

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from golem.interfaces.images import to_camera
-from golem.interfaces.lens import Lens, to_lens
+from golem.interfaces.images import Lens, to_camera, to_lens
 from golem.middleware.ros.message import CodecError
 from golem.middleware.ros.msgs.sensor_msgs import CameraInfo, RegionOfInterest
 

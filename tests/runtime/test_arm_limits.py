@@ -7,8 +7,7 @@ import pytest
 
 from golem.capabilities.arms.postures import POSTURES
 from golem.errors import ModuleFault
-from golem.robots.model.limits import load_limits
-from golem.robots.model.table import JOINT_NAMES
+from golem.robots.model.table import JOINT_NAMES, load_limits
 from golem.runtime.arm_limits import BEGINNING, ROUNDING, ArmLimits
 from golem.runtime.contract_check import ContractCheck
 from golem.types import NUM_JOINTS, UPPER, Array

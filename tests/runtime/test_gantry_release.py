@@ -11,8 +11,8 @@ import pytest
 
 from golem.errors import ModuleFault
 from golem.robots.base import HasGantry
-from golem.runtime.gantry_release import READY
 from golem.runtime.lockstep import LockstepRunner, build, start_posture
+from golem.runtime.standing_legs import READY
 from golem.stack import Choice, Stack
 
 CROUCH = Choice("hold", {"stance": "crouch", "standing": True})

@@ -19,7 +19,7 @@ from golem.interfaces.payloads import Odometry
 from golem.middleware.bus import Bus
 from golem.robots.model.spatial import transform
 from golem.runtime.contract_check import ContractCheck
-from golem.runtime.mapper_node import MapperNode
+from golem.runtime.odometry_node import MapperNode
 from golem.types import BaseEstimate, PlanarPose
 
 

@@ -15,7 +15,7 @@ from golem.interfaces import topics
 from golem.interfaces.nav_payloads import NavGoal, NavStep, OccupancyGrid, Scan
 from golem.interfaces.payloads import LegStatus, Odometry
 from golem.middleware.bus import Bus
-from golem.robots.model.kinematics import Kinematics
+from golem.robots.model.pinocchio_model import Kinematics
 from golem.runtime.checked import CheckedNavigator
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.navigator_node import NavigatorNode

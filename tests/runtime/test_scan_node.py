@@ -14,7 +14,7 @@ from golem.interfaces.nav_payloads import Scan
 from golem.interfaces.payloads import Odometry
 from golem.middleware.bus import Bus
 from golem.robots.model.spatial import transform
-from golem.runtime.scan_node import ScanNode
+from golem.runtime.odometry_node import ScanNode
 
 
 class Rig:

@@ -16,7 +16,7 @@ from golem.capabilities.properties.property_table import PropertyTable
 from golem.interfaces import topics
 from golem.interfaces.payloads import Detections, GripState, HandStatus
 from golem.middleware.bus import Bus
-from golem.robots.model.kinematics import Kinematics
+from golem.robots.model.pinocchio_model import Kinematics
 from golem.runtime.skill_table import SkillTable
 from golem.skills.context import Context, Modules
 from golem.skills.runner import SkillRun

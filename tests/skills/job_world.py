@@ -20,7 +20,7 @@ from golem.capabilities.navigation.edge_fit import NearEdge
 from golem.interfaces import topics
 from golem.interfaces.payloads import LegStatus
 from golem.middleware.bus import Bus
-from golem.robots.model.kinematics import Kinematics
+from golem.robots.model.pinocchio_model import Kinematics
 from golem.skills import pack_job
 from golem.skills.base import SkillResult
 from golem.skills.context import Context
@@ -32,7 +32,7 @@ from golem.skills.kept_file import KeptFileConfig
 from golem.skills.navigate import Navigate
 from golem.skills.pack_view import SeenFasteners
 from golem.skills.pick import Pick
-from golem.skills.pick_report import PickOutcome, PickReport, Tried
+from golem.skills.pick_config import PickOutcome, PickReport, Tried
 from golem.skills.runner import SkillRun
 from golem.types import Array, BaseEstimate, PlanarPose, Twist
 

@@ -15,7 +15,7 @@ from golem.capabilities.arms.base import TargetError
 from golem.interfaces import topics
 from golem.interfaces.payloads import DetectionRequest, Detections, Feedback, GripState, HandGoal
 from golem.middleware.bus import Bus
-from golem.robots.model.kinematics import Kinematics
+from golem.robots.model.pinocchio_model import Kinematics
 from golem.skills.base import SkillResult, StageFailed
 from golem.skills.context import Context
 from golem.types import NUM_JOINTS, Array, BaseEstimate, Imu, LowState

@@ -10,15 +10,14 @@ from tests.skills.conftest import modules
 
 from golem.errors import ConfigError
 from golem.middleware.bus import Bus
-from golem.robots.model.kinematics import Kinematics
+from golem.robots.model.pinocchio_model import Kinematics
 from golem.skills.base import SkillResult
 from golem.skills.context import Context
 from golem.skills.disassemble import Disassemble
 from golem.skills.disassemble_goal import DisassembleGoal
 from golem.skills.dock import Dock, DockGoal, DockReport
 from golem.skills.pick import Pick
-from golem.skills.pick_config import PickGoal
-from golem.skills.pick_report import PickOutcome, PickReport, Sight, Tried
+from golem.skills.pick_config import PickGoal, PickOutcome, PickReport, Sight, Tried
 from golem.skills.runner import SkillRun
 
 GONE = PickOutcome.OUT_OF_REACH

@@ -16,7 +16,7 @@ from golem.interfaces import topics
 from golem.interfaces.memory_payloads import MemoryStatus
 from golem.interfaces.payloads import GripState, HandStatus, LegStatus
 from golem.middleware.bus import Bus
-from golem.robots.model.kinematics import Kinematics
+from golem.robots.model.pinocchio_model import Kinematics
 from golem.skills.base import SkillResult
 from golem.skills.context import Context
 from golem.skills.fetch import Fetch, FetchGoal

@@ -9,8 +9,8 @@ import numpy as np
 from golem.capabilities.arms.postures import POSTURES
 from golem.interfaces import topics
 from golem.skills.base import SkillResult
+from golem.skills.body_interface import GATE_TIMEOUT
 from golem.skills.context import Context
-from golem.skills.joint_motion import GATE_TIMEOUT
 from golem.types import NUM_JOINTS, UPPER, Imu, LowState
 
 HOME = POSTURES["home"]

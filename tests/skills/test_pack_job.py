@@ -19,13 +19,13 @@ from tests.skills.job_world import JobWorld, edge_places, picked, write_list
 from golem.errors import ConfigError
 from golem.interfaces import topics
 from golem.middleware.bus import Bus
-from golem.robots.model.kinematics import Kinematics
+from golem.robots.model.pinocchio_model import Kinematics
 from golem.skills.context import Context
 from golem.skills.disassemble_goal import DisassembleGoal
 from golem.skills.fastener_list import read_list
 from golem.skills.job_file import Fate, JobFault, JobFile
 from golem.skills.pack_job import KEEP_OFF, SILENT, Gantry, fit_frames, matched
-from golem.skills.pick_report import PickReport
+from golem.skills.pick_config import PickReport
 from golem.types import PlanarPose
 
 PLACES = edge_places(30)

@@ -21,7 +21,7 @@ from golem.capabilities.properties.property_table import PropertyTable
 from golem.interfaces import topics
 from golem.interfaces.payloads import GateState, GateStatus
 from golem.middleware.bus import Bus
-from golem.robots.model.kinematics import Kinematics
+from golem.robots.model.pinocchio_model import Kinematics
 from golem.robots.model.table import JOINT_NAMES
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.nodes import UpperBodyNode

@@ -13,7 +13,7 @@ from tests.skills.conftest import modules
 from golem.errors import MissingExtra, unknown_name
 from golem.interfaces import topics
 from golem.middleware.bus import Bus
-from golem.robots.model.kinematics import Kinematics
+from golem.robots.model.pinocchio_model import Kinematics
 from golem.skills.base import Skill, SkillCancelled, SkillResult, StageFailed
 from golem.skills.context import Context
 from golem.skills.pursuit import CLEANUP, pursue

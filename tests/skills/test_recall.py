@@ -13,7 +13,7 @@ from golem.evaluation.conformance.memory_suite import look
 from golem.interfaces import topics
 from golem.interfaces.memory_payloads import MemoryStatus
 from golem.middleware.bus import Bus
-from golem.robots.model.kinematics import Kinematics
+from golem.robots.model.pinocchio_model import Kinematics
 from golem.skills.base import SkillResult
 from golem.skills.context import Context
 from golem.skills.recall import Recall, RecallGoal

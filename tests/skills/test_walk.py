@@ -18,7 +18,7 @@ from golem.interfaces import topics
 from golem.interfaces.nav_payloads import NavStep
 from golem.interfaces.payloads import LegStatus, Odometry
 from golem.middleware.bus import Bus
-from golem.robots.model.kinematics import Kinematics
+from golem.robots.model.pinocchio_model import Kinematics
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.navigator_node import NavigatorNode
 from golem.skills.base import SkillResult

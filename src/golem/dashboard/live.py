@@ -1,6 +1,6 @@
 """The live view: the robot in a browser, in real time, with its cameras, its state and the operator's buttons.
 
-A viewer of the simulation, no module of the stack: it sees the simulator's scene through `dashboard.stage`. On the
+A viewer of the simulation, no module of the stack: it sees the simulator's scene through `dashboard.server`. On the
 robot it acts as an operator does, through the e-stop, requests to the safety gate, twists and skills; and as the world
 does, with a push.
 """
@@ -19,8 +19,7 @@ import numpy as np
 from golem.dashboard.balance_chart import SPAN, balance_chart
 from golem.dashboard.map_view import map_view
 from golem.dashboard.panel import Button, Panel
-from golem.dashboard.server import serve
-from golem.dashboard.stage import Stage
+from golem.dashboard.server import Stage, serve
 from golem.dashboard.status import Timeline, camera_picture, read_status
 from golem.errors import GolemError
 from golem.hardware.safety.base import OperatorRequest

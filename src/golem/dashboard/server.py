@@ -11,15 +11,107 @@ import contextlib
 import functools
 import io
 import logging
+import math
 import socket
 from typing import TYPE_CHECKING
 from unittest import mock
 
+import numpy as np
+from numpy.typing import NDArray
+
 from golem.errors import ConfigError, MissingExtra
 from golem.middleware.web_gate import LOCAL
+from golem.robots.model.table import BASE_LINK
+from golem.robots.mujoco.spectator import SpectatorView
+from golem.types import Array
 
 if TYPE_CHECKING:
     import viser
+
+if TYPE_CHECKING:
+    import viser
+
+TARGET_COLOUR = (255, 60, 160)
+PUSH_COLOUR = (232, 78, 60)
+ARROW = 0.003
+"""Length of a push's arrow per force [m/N]."""
+LONGEST = 0.9
+"""Longest arrow [m]."""
+LAG = 0.6
+"""Time constant with which the camera follows [s]: a push is seen to move the robot, not the hall."""
+WORLD = "/world"
+Camera = tuple[tuple[float, float, float], tuple[float, float, float]]
+"""Position and the point looked at [m]."""
+HANGING: Camera = ((2.1, 1.1, 1.95), (0.34, -0.04, 1.12))
+STANDING: Camera = ((-1.25, -2.55, 1.55), (0.25, 0.0, 0.82))
+
+
+class Stage:
+    """What one server shows of one simulated world.
+
+    The camera belongs to the spectator, who may turn it at any time; so it is the world that moves under it.
+    """
+
+    def __init__(self, server: viser.ViserServer, view: SpectatorView, *, standing: bool) -> None:
+        """Show what `view` sees of a robot that is `standing` or hangs."""
+        self._view = view
+        scene = server.scene
+        scene.set_up_direction("+z")
+        scene.configure_environment_map("studio", environment_intensity=0.22)
+        scene.configure_default_lights(enabled=False)
+        scene.add_light_directional("/sun", intensity=1.9, cast_shadow=True, position=(1.6, -1.4, 4.0))
+        scene.add_light_directional("/fill", intensity=0.5, position=(2.0, 3.0, 2.0))
+        scene.set_background_image(_sky(), format="png")
+        camera = server.initial_camera
+        camera.position, camera.look_at = STANDING if standing else HANGING
+        camera.fov = 0.75
+        self._world = scene.add_frame(WORLD, show_axes=False)
+        self._bodies = {mesh.name: scene.add_glb(f"{WORLD}/{mesh.name}", mesh.glb) for mesh in view.meshes()}
+        self._target = scene.add_icosphere(f"{WORLD}/target", radius=0.012, color=TARGET_COLOUR, visible=False)
+        self._target_label = scene.add_label(f"{WORLD}/target_label", "target", visible=False)
+        self._arrow = scene.add_arrows(
+            f"{WORLD}/push", np.zeros((1, 2, 3)), PUSH_COLOUR, shaft_radius=0.014, head_radius=0.035, visible=False
+        )
+        self._followed: Array = np.zeros(2)
+        self.show(0.0, None)
+
+    def look(self, view: SpectatorView) -> None:
+        """Show what `view` sees from now on: another episode in the same world."""
+        self._view = view
+        self._followed = np.zeros(2)
+
+    def show(self, dt: float, target: Array | None) -> None:
+        """Show the present moment.
+
+        Args:
+            dt: time since the last one [s].
+            target: (3,) what the skill aims at, in odom [m], or None.
+        """
+        for name, position, wxyz in zip(self._view.moving, *self._view.poses(), strict=True):
+            handle = self._bodies[name]
+            handle.position, handle.wxyz = position, wxyz
+        base = self._view.position(BASE_LINK)[:2]
+        self._followed += (1.0 - math.exp(-dt / LAG)) * (base - self._followed)
+        self._world.position = (-self._followed[0], -self._followed[1], 0.0)
+        self._target.visible = self._target_label.visible = target is not None
+        if target is not None:
+            self._target.position = self._target_label.position = self._view.from_odom(target)
+
+    def show_push(self, force: Array, body: str) -> None:
+        """Show a push with the (3,) `force` in the world [N] on a body; zero hides it."""
+        size = float(np.linalg.norm(force))
+        self._arrow.visible = size > 0.0
+        if size > 0.0:
+            head = self._view.position(body)
+            tail = head - force / size * min(ARROW * size, LONGEST)
+            self._arrow.points = np.array([[tail, head]], dtype=np.float32)
+
+
+def _sky() -> NDArray[np.uint8]:
+    """Return a background that is light above and darker at the horizon."""
+    rows = np.linspace(0.0, 1.0, 256)[:, None, None]
+    colours = (1.0 - rows) * np.array([236.0, 241.0, 247.0]) + rows * np.array([150.0, 162.0, 178.0])
+    return np.broadcast_to(colours, (256, 4, 3)).astype(np.uint8)
 
 
 def serve(host: str, port: int) -> viser.ViserServer:

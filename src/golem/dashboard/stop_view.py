@@ -13,8 +13,7 @@ import mujoco
 import numpy as np
 from tyro.conf import Positional
 
-from golem.dashboard.server import serve
-from golem.dashboard.stage import Stage
+from golem.dashboard.server import Stage, serve
 from golem.errors import ConfigError
 from golem.hardware.safety.base import SafetyLimits
 from golem.hardware.safety.monitor import at_rest

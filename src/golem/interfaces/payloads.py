@@ -37,7 +37,7 @@ class ArmCommand:
 
     Attributes:
         q: (15,) joint targets, torso, left arm, right arm [rad]; inside the position limits, and no
-            further from the previous tick's targets than the velocity limits of `robots.model.limits` allow. The first
+            further from the previous tick's targets than the velocity limits of `robots.model.table` allow. The first
             ones after a reset start from the measured joints.
         error_position: (2,) distance of the left and right grasp frame from its target at `q` [m]; 0 without one.
         error_rotation: (2,) angle between grasp frame and target at `q` [rad]; 0 for an arm without one.

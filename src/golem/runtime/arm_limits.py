@@ -7,8 +7,7 @@ import math
 import numpy as np
 
 from golem.kernels import njit
-from golem.robots.model.limits import load_limits
-from golem.robots.model.table import JOINT_NAMES
+from golem.robots.model.table import JOINT_NAMES, load_limits
 from golem.runtime.contract_check import ContractCheck
 from golem.types import UPPER, Array
 

@@ -1,4 +1,4 @@
-"""The node of the navigator: it computes steps towards the goal that a skill set, and drives the legs by them."""
+"""The node of the navigator, which drives the legs towards the goal that a skill set, and its link to Nav2."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from golem.capabilities.navigation.base import Navigator, NavInputs
 from golem.capabilities.navigation.footprint import Footprint
 from golem.errors import ModuleFault
 from golem.interfaces import topics
-from golem.interfaces.nav_payloads import HERE, NavGoal, NavPath, NavStep, OccupancyGrid
+from golem.interfaces.nav_payloads import HERE, Nav2Goal, Nav2Reply, NavGoal, NavPath, NavStep, OccupancyGrid
 from golem.interfaces.payloads import ModuleFaultMsg
 from golem.middleware.bus import Bus, News
 from golem.runtime.contract_check import ContractCheck
@@ -20,6 +20,32 @@ from golem.skills.base import StageFailed
 from golem.skills.legs_interface import LegsInterface
 from golem.skills.runner import LACKS
 from golem.types import Array, PlanarPose, Twist
+
+
+class BusNav2:
+    """See `golem.capabilities.navigation.nav2.Nav2Link`."""
+
+    def __init__(self, bus: Bus) -> None:
+        """Speak over `bus`."""
+        self._bus, self._number = bus, 0
+        self._twists = News(bus, topics.NAV2_TWIST)
+
+    def send(self, pose: PlanarPose) -> None:
+        """Propose a goal; see `Nav2Link`."""
+        self._number += 1
+        self._twists.read()
+        self._bus.publish(topics.NAV2_GOAL, Nav2Goal(self._number, pose), 0.0)  # no latency: the time has no meaning
+
+    def reply(self) -> Nav2Reply | None:
+        """Return how the newest goal stands; see `Nav2Link`."""
+        reply = self._bus.latest(topics.NAV2_REPLY)
+        return None if reply is None or reply.number != self._number else reply
+
+    def twist(self) -> Twist | None:
+        """Return a new twist; see `Nav2Link`."""
+        said = self._twists.read()
+        return None if said is None else said.twist
+
 
 ZERO = Twist()
 BODY_MARGIN = 0.01

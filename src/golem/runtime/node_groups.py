@@ -23,23 +23,20 @@ from golem.interfaces import topics
 from golem.interfaces.payloads import GateStatus
 from golem.middleware.bus import Bus
 from golem.robots.base import HasGantry, HasLidar, Robot
-from golem.robots.model.kinematics import Kinematics
+from golem.robots.model.pinocchio_model import Kinematics
 from golem.robots.unitree import motion_switcher
 from golem.robots.unitree.motion_switcher import MotionSwitcher
 from golem.runtime import nodes, perception_nodes, robot_nodes, safety_nodes
 from golem.runtime.checked import CheckedGraspMethod, CheckedMemory, CheckedNavigator, CheckedPlanner, CheckedProperties
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.executor import Phase, Placed
-from golem.runtime.gantry_release import GantryReleaseNode
 from golem.runtime.lower_body_node import CheckedLowerBody, LowerBodyNode
-from golem.runtime.mapper_node import MapperNode
 from golem.runtime.memory_node import MemoryNode
-from golem.runtime.nav2_link import BusNav2
-from golem.runtime.navigator_node import NavigatorNode
-from golem.runtime.odometry_node import LidarNode, OdometryNode
+from golem.runtime.navigator_node import BusNav2, NavigatorNode
+from golem.runtime.odometry_node import LidarNode, MapperNode, OdometryNode, ScanNode
 from golem.runtime.onboard_nodes import BusOnboard, LocoServiceNode, ServiceNode, stack_loco_api
-from golem.runtime.scan_node import ScanNode
 from golem.runtime.skill_table import SkillTable
+from golem.runtime.standing_legs import GantryReleaseNode
 from golem.skills.base import Routine
 from golem.skills.context import Context, Modules
 from golem.skills.pursuit import pursue

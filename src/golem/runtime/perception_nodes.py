@@ -15,7 +15,7 @@ from golem.interfaces import topics
 from golem.interfaces.payloads import Detections, Exposure, ModuleFaultMsg
 from golem.middleware.bus import Bus, News
 from golem.robots.base import STAMP_TOLERANCE, Robot
-from golem.robots.model.kinematics import Kinematics
+from golem.robots.model.pinocchio_model import Kinematics
 from golem.robots.sensors.calibration import OPTICAL_FRAMES
 from golem.runtime.contract_check import ContractCheck
 from golem.types import TICK, Array, BaseEstimate, LocalizedObject, LowState, Mask, RgbdImage

@@ -20,13 +20,11 @@ from golem.capabilities.properties.base import Properties, PropertySource
 from golem.interfaces import topics
 from golem.interfaces.payloads import Feedback
 from golem.middleware.bus import Bus, Topic
-from golem.robots.model.kinematics import Kinematics
+from golem.robots.model.pinocchio_model import Kinematics
 from golem.skills.base import Skill, SkillResult, StageFailed, Tick, expect
+from golem.skills.body_interface import HandInterface, Navigation, follow
 from golem.skills.detection_stream import DetectionStream
-from golem.skills.hand_interface import HandInterface
-from golem.skills.joint_motion import follow
 from golem.skills.legs_interface import LegsInterface
-from golem.skills.navigation import Navigation
 from golem.skills.pursuit import call
 from golem.types import SIDES, UPPER, Array, LocalizedObject, PalmTargets, PlanarPose, Side
 

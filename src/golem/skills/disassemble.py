@@ -19,7 +19,7 @@ from golem.skills.fastener_list import read_list
 from golem.skills.job_file import Fate, JobFile, PackFastener
 from golem.skills.kept_file import KeptFileConfig, kept_file
 from golem.skills.pack_job import PackJob
-from golem.skills.pick_report import PickOutcome, PickReport, Sight
+from golem.skills.pick_config import PickOutcome, PickReport, Sight
 
 COLUMNS = "name class x y z said_loose fate reason tries hand tray stance robot_s date_utc picture".split()
 COLOURS = {Fate.IN_TRAY: "#2a2", Fate.OPEN: "#888", Fate.TIGHT: "#c80", Fate.JAMMED: "#c80"}

@@ -9,8 +9,7 @@ from golem.errors import ConfigError
 from golem.options import require
 from golem.skills.dock import DockGoal, DockReport
 from golem.skills.kept_file import check_file_name
-from golem.skills.pick_config import PickGoal
-from golem.skills.pick_report import PickReport
+from golem.skills.pick_config import PickGoal, PickReport
 
 Loosened = Literal["all", "list", "gantry", "unknown"]
 

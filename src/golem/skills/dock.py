@@ -13,9 +13,9 @@ from golem.options import require
 from golem.skills.approach import APPROACH, TIMEOUT, approach
 from golem.skills.base import SkillResult, StageFailed
 from golem.skills.context import Context
-from golem.skills.floor_places import floor_places
 from golem.skills.pack_view import CAMERA, LOOK, see_edge, see_fasteners
 from golem.skills.pose_goal import FIRST_REPORT, MARGIN
+from golem.skills.poses import floor_places
 from golem.skills.stance_choice import GOOD, PackStance, best_stance, stance_here
 from golem.types import Array, PlanarPose, Twist
 

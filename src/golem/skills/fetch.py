@@ -17,14 +17,14 @@ from golem.errors import ConfigError
 from golem.options import require
 from golem.skills.approach import APPROACH, approach
 from golem.skills.base import SkillResult, StageFailed
-from golem.skills.closing import PATIENCE, KeptGrip
 from golem.skills.context import Context
+from golem.skills.force_guard import PATIENCE, KeptGrip
 from golem.skills.navigate import NavigateGoal
 from golem.skills.pack_view import see_edge
 from golem.skills.place import PlaceGoal
 from golem.skills.pose_goal import FIRST_REPORT
 from golem.skills.poses import lifted
-from golem.skills.recalled import RecalledPlace, RecalledPlaces, ask
+from golem.skills.recall import RecalledPlace, RecalledPlaces, ask
 from golem.skills.remember import RememberGoal
 from golem.skills.take_config import TakeGoal, TakeReport
 from golem.types import Array, PlanarPose, Side, Twist

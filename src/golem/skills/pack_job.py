@@ -22,8 +22,7 @@ from golem.skills.job_file import TO_DO, Fate, JobFile, PackFastener
 from golem.skills.navigate import NavigateGoal
 from golem.skills.pack_plan import PackSides, PackStop, make_plan
 from golem.skills.pack_view import NOTHING, see_edge, see_fasteners
-from golem.skills.pick_config import PickGoal
-from golem.skills.pick_report import PickOutcome, PickReport, Sight, Tried
+from golem.skills.pick_config import PickGoal, PickOutcome, PickReport, Sight, Tried
 from golem.skills.pick_targets import WANTED
 from golem.types import Array, PlanarPose, Side
 

@@ -14,10 +14,10 @@ from golem.interfaces import topics
 from golem.middleware.bus import News
 from golem.skills.base import StageFailed
 from golem.skills.context import Context
-from golem.skills.floor_places import stands_at
 from golem.skills.pick_targets import TORSO
 from golem.skills.pick_targets import WANTED as NEAR
 from golem.skills.planned_motion import PlannedMotion
+from golem.skills.poses import stands_at
 from golem.skills.stance_choice import LOOK_TURN
 from golem.types import Array, LocalizedObject, PlanarPose
 

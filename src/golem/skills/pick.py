@@ -13,14 +13,21 @@ from golem.interfaces.payloads import GripState
 from golem.skills.base import SkillCancelled, SkillResult, StageFailed
 from golem.skills.context import Context
 from golem.skills.finger_room import FingerRoom
-from golem.skills.floor_places import floor_places, stands_at
 from golem.skills.force_guard import ForceGuard
 from golem.skills.pack_view import see_fasteners
-from golem.skills.pick_config import PickConfig, PickGoal
+from golem.skills.pick_config import (
+    PickConfig,
+    PickFailed,
+    PickGoal,
+    PickOutcome,
+    PickReport,
+    Sight,
+    outcome_of,
+    slipped,
+)
 from golem.skills.pick_place import look_after, place
-from golem.skills.pick_report import PickFailed, PickOutcome, PickReport, Sight, outcome_of, slipped
 from golem.skills.pick_targets import SAME, Attempt, PickChoice, TargetChoice
-from golem.skills.poses import lifted, moved, retracted
+from golem.skills.poses import floor_places, lifted, moved, retracted, stands_at
 from golem.skills.stance_choice import stance_here
 from golem.skills.travel import LineTravel, PlannedTravel, Travel
 from golem.types import Array, Side

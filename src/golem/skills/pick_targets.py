@@ -14,10 +14,9 @@ from golem.capabilities.planning.base import PlanRefused
 from golem.interfaces.payloads import Detections
 from golem.skills.container import Container
 from golem.skills.context import Context
-from golem.skills.floor_places import floor_places, stands_at
-from golem.skills.pick_config import PickConfig, PickGoal
-from golem.skills.pick_report import PickFailed, PickOutcome, Tried
+from golem.skills.pick_config import PickConfig, PickFailed, PickGoal, PickOutcome, Tried
 from golem.skills.planned_motion import PlannedMotion
+from golem.skills.poses import floor_places, stands_at
 from golem.types import SIDES, Array, LocalizedObject, Side
 
 AROUND: Array = np.array([[0.0, 0.0, 0.0], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]], float)

@@ -18,9 +18,8 @@ from golem.interfaces.payloads import GripState
 from golem.options import require
 from golem.robots.model.magpie_model import MAX_GAP
 from golem.skills.base import SkillCancelled, SkillResult, StageFailed
-from golem.skills.closing import close_hand
 from golem.skills.context import Context
-from golem.skills.force_guard import ForceGuard
+from golem.skills.force_guard import ForceGuard, close_hand
 from golem.skills.poses import at_height, lifted, retracted
 from golem.skills.ware_sight import surface_below
 from golem.types import SIDES, Array, Side

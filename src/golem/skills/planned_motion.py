@@ -12,8 +12,7 @@ from golem.capabilities.arms.base import ARM_COLUMNS
 from golem.capabilities.arms.goal_postures import POSITION, GoalPostures
 from golem.capabilities.arms.line import LineChecker
 from golem.capabilities.collision.collision_model import CollisionModel
-from golem.capabilities.collision.obstacles import World, cleared
-from golem.capabilities.collision.scene_cloud import displaced, scene_world
+from golem.capabilities.collision.obstacles import World, cleared, displaced, scene_world
 from golem.capabilities.planning.base import Held, Plan, PlanRefused, PlanRequest, Refusal
 from golem.capabilities.planning.joint_space import JointSpace, PlanningRobot
 from golem.capabilities.planning.plan_kernel import ITSELF, WORLD

@@ -1,10 +1,34 @@
-"""Poses of a hand that are found from another one."""
+"""Poses of a hand that are found from another one, and places on the floor."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+
 import numpy as np
 
+from golem.errors import ConfigError
 from golem.types import Array
+
+
+def floor_places(what: str, numbers: Sequence[float]) -> Array:
+    """Return (n, 2) the places that `numbers` name.
+
+    Args:
+        what: which goal has them, for the error.
+        numbers: x, y of each [m].
+
+    Raises:
+        ConfigError: they are no pairs, or not finite.
+    """
+    if len(numbers) % 2 or not all(map(math.isfinite, numbers)):
+        raise ConfigError(f"The places of {what} are pairs of finite numbers, x and y of each place.")
+    return np.array(numbers, float).reshape(-1, 2)
+
+
+def stands_at(position: Array, places: Array, within: float) -> bool:
+    """Return whether `position` (2,) or (3,) is, over the floor, less than `within` [m] from one of `places` (n, 2)."""
+    return bool((np.linalg.norm(places - position[:2], axis=1) < within).any())
 
 
 def lifted(T: Array, height: float) -> Array:

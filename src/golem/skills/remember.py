@@ -11,7 +11,7 @@ from golem.options import require
 from golem.skills.base import SkillResult, StageFailed
 from golem.skills.context import Context
 from golem.skills.pose_goal import MARGIN
-from golem.skills.recalled import RecalledPlaces, ask, memory_status, sentence
+from golem.skills.recall import RecalledPlaces, ask, memory_status, sentence
 
 MAX_SECONDS = 3600.0
 

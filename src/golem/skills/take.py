@@ -19,8 +19,8 @@ from golem.capabilities.properties.base import holding_force
 from golem.interfaces.payloads import GripState
 from golem.robots.model.magpie_model import MAX_GAP
 from golem.skills.base import SkillCancelled, SkillResult, StageFailed
-from golem.skills.closing import close_hand
 from golem.skills.context import Context
+from golem.skills.force_guard import close_hand
 from golem.skills.poses import lifted, retracted
 from golem.skills.take_config import TakeGoal, TakeReport, TakeThingConfig
 from golem.skills.ware_sight import find, surface_below

@@ -6,7 +6,7 @@ import pytest
 
 from golem.capabilities.arms.arm_kinematics import UpperKinematics
 from golem.capabilities.arms.postures import mirror
-from golem.robots.model.kinematics import Kinematics
+from golem.robots.model.pinocchio_model import Kinematics
 from golem.types import NUM_JOINTS, SIDES, UPPER, Side
 
 

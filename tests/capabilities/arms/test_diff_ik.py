@@ -17,8 +17,7 @@ from golem.capabilities.collision.collision_model import CollisionModel
 from golem.capabilities.collision.sphere_robot import load_spheres
 from golem.errors import ConfigError
 from golem.hardware.safety.base import SafetyLimits
-from golem.robots.model.limits import load_limits
-from golem.robots.model.table import JOINT_NAMES
+from golem.robots.model.table import JOINT_NAMES, load_limits
 from golem.types import NUM_JOINTS, SIDES, UPPER, Array
 
 DT = 0.01

@@ -8,7 +8,7 @@ from golem.capabilities.arms.arm_kinematics import UpperKinematics
 from golem.capabilities.arms.base import TargetError
 from golem.capabilities.arms.postures import POSTURES, downward, posture
 from golem.errors import ConfigError
-from golem.robots.model.kinematics import Kinematics
+from golem.robots.model.pinocchio_model import Kinematics
 from golem.robots.sensors.cameras import CAMERAS
 from golem.types import NUM_JOINTS, SIDES, UPPER, Side
 

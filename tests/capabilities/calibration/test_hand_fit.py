@@ -12,8 +12,8 @@ from golem.capabilities.calibration.hand_view_postures import SPARE, hand_view_p
 from golem.capabilities.calibration.kinematic_fit import ARM, PIXEL, TagView, pose
 from golem.errors import ConfigError
 from golem.hardware.safety.base import SafetyLimits
-from golem.robots.model.kinematics import Kinematics
 from golem.robots.model.magpie_model import T_HAND_CAMERA, hand_name
+from golem.robots.model.pinocchio_model import Kinematics
 from golem.robots.model.tag_cuff import cuff_tags, tag_corners
 from golem.robots.sensors.cameras import CAMERAS, project
 from golem.types import NUM_JOINTS, SIDES, UPPER, Array, Side

@@ -16,7 +16,7 @@ from golem.capabilities.collision.packing_report import spheres_collide
 from golem.capabilities.collision.sphere_packer import Packing
 from golem.capabilities.collision.sphere_robot import SphereRobot, holding, load_spheres
 from golem.errors import ConfigError
-from golem.robots.model.kinematics import Kinematics
+from golem.robots.model.pinocchio_model import Kinematics
 from golem.robots.model.table import JOINT_NAMES
 from golem.types import NUM_JOINTS, UPPER, Array
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from golem.capabilities.collision.obstacles import World, cleared, cloud_grid
-from golem.capabilities.collision.scene_cloud import ROBOT_MARGIN, displaced, scene_world
+from golem.capabilities.collision.obstacles import ROBOT_MARGIN, World, cleared, cloud_grid, displaced, scene_world
 from golem.types import Array
 
 NONE = np.zeros((0, 4))

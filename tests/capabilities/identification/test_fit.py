@@ -12,7 +12,7 @@ from golem.capabilities.identification.sweep import MIDDLE, swing
 from golem.evaluation.identification.identify_command import simulate
 from golem.hardware.servo.gains import default_gains
 from golem.robots.model.imu_mount import TORSO
-from golem.robots.model.limits import load_limits
+from golem.robots.model.table import load_limits
 from golem.types import TICK, Array
 
 

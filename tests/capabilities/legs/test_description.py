@@ -8,7 +8,7 @@ import pytest
 from golem.capabilities.legs.description import load_description, shipped
 from golem.capabilities.legs.hold import STANCES
 from golem.errors import ConfigError
-from golem.robots.model.limits import load_limits
+from golem.robots.model.table import load_limits
 
 TEXT = """
 network: net.onnx

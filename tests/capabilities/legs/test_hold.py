@@ -7,7 +7,7 @@ from golem.capabilities.legs.base import LocomotionCommand, LowerBody
 from golem.capabilities.legs.hold import STANCES, HoldConfig, JointHold, squat
 from golem.errors import ConfigError
 from golem.robots.model.leg_kinematics import leg_poses, sole_centers
-from golem.robots.model.limits import load_limits
+from golem.robots.model.table import load_limits
 from golem.types import LEGS, NUM_JOINTS, BaseEstimate, Imu, LowState, Twist
 
 BASE = BaseEstimate(0.0, np.eye(4))

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from golem.capabilities.legs.stop_predictor import StopPredictor
+from golem.capabilities.legs.gait_clock import StopPredictor
 from golem.types import Array, PlanarPose
 
 DT = 0.01

@@ -18,8 +18,7 @@ from golem.interfaces import topics
 from golem.interfaces.payloads import LegCommand
 from golem.robots.model import pinocchio_model
 from golem.robots.model.leg_kinematics import SOLE_CENTER
-from golem.robots.model.limits import load_limits
-from golem.robots.model.table import DOF
+from golem.robots.model.table import DOF, load_limits
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.runtime.lockstep import build
 from golem.stack import Choice, load_stack

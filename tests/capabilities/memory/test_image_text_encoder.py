@@ -13,7 +13,7 @@ import pytest
 from golem import registry
 from golem.capabilities.memory.base import Observation
 from golem.capabilities.memory.frame_index import FrameIndex, FrameIndexConfig, ImageTextEncoder
-from golem.capabilities.perception import hub_model
+from golem.capabilities.perception import open_words
 from golem.errors import ConfigError, MissingExtra
 from golem.evaluation.conformance import samples
 
@@ -99,6 +99,6 @@ def test_without_weights_a_sentence_says_what_is_missing() -> None:
 def test_without_the_extra_a_sentence_says_what_installs_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "transformers", None)
     monkeypatch.setitem(__import__("sys").modules, "torch", None)
-    assert hub_model.EXTRA == "vision"
+    assert open_words.EXTRA == "vision"
     with pytest.raises(MissingExtra, match=r"golem-humanoid\[vision\]"):
         FrameIndex(FrameIndexConfig("clip", tmp_path))

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from golem.capabilities.navigation.astar import Way
 from golem.capabilities.navigation.footprint import HOME
 from golem.capabilities.navigation.local_controller import LocalController, LocalControllerConfig
-from golem.capabilities.navigation.way import Way
 from golem.types import Array, PlanarPose, Twist
 
 HERE = PlanarPose(0.0, 0.0, 0.0)

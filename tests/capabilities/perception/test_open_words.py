@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from golem.capabilities.perception import hub_model
+from golem.capabilities.perception import open_words
 from golem.capabilities.perception.grounding_dino import GroundingDino
 from golem.capabilities.perception.open_words import OpenWordsConfig, Sam
 from golem.capabilities.perception.owlv2 import Owlv2
@@ -133,4 +133,4 @@ def test_without_the_extra_the_line_that_installs_it_is_told(monkeypatch: pytest
     monkeypatch.setitem(__import__("sys").modules, "transformers", None)
     pytest.importorskip("torch", reason="torch is told first where both are absent")
     with pytest.raises(MissingExtra, match=r"'transformers' is not installed; .*golem-humanoid\[vision\]"):
-        hub_model.load_model(tmp_path, "owlv2", "Owlv2ForObjectDetection", "Owlv2Processor")
+        open_words.load_model(tmp_path, "owlv2", "Owlv2ForObjectDetection", "Owlv2Processor")

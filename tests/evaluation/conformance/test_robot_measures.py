@@ -16,7 +16,7 @@ from golem.evaluation.conformance.robot_rig import Path, RobotRig
 from golem.evaluation.conformance.still_robot import StillRobot
 from golem.hardware.servo.gravity import Gravity
 from golem.robots.model.imu_mount import TORSO
-from golem.robots.model.kinematics import Kinematics
+from golem.robots.model.pinocchio_model import Kinematics
 from golem.robots.model.table import JOINT_INDEX
 from golem.robots.sensors.cameras import CAMERAS, HEAD, project
 from golem.runtime.lockstep import start_posture

@@ -8,7 +8,7 @@ import pytest
 from golem.evaluation.base import TrialOutcome
 from golem.evaluation.episodes.pick_claims import Fastener, claims
 from golem.evaluation.rungs.pick_screw import verdict, verdict_tables
-from golem.skills.pick_report import PickReport, Tried
+from golem.skills.pick_config import PickReport, Tried
 
 
 def fastener(x: float, y: float, loose: bool) -> Fastener:

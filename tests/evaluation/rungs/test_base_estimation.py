@@ -23,7 +23,7 @@ from golem.evaluation.rungs.base_estimation import (
     wrong_contacts,
 )
 from golem.hardware.estimator.feet import FeetConfig
-from golem.hardware.estimator.random_walk import base_velocity
+from golem.hardware.estimator.random_walk_kf import base_velocity
 from golem.robots.model.leg_dynamics import LegDynamics
 from golem.robots.model.spatial import rotation_rpy
 from golem.types import LEGS, NUM_JOINTS, Array, Imu, LowState

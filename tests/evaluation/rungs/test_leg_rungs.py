@@ -13,9 +13,9 @@ from golem.capabilities.legs.base import Envelope
 from golem.errors import ConfigError
 from golem.evaluation.base import RUNGS, TrialOutcome, TrialSpec, make_rung
 from golem.evaluation.harness.ladder import LadderConfig, run_ladder
-from golem.evaluation.rungs import leg_rung, stand_minute, walk_endurance, walk_rough, walk_stop
+from golem.evaluation.rungs import leg_rung, stand_minute, walking
 from golem.evaluation.rungs.leg_rung import NO_WALKER
-from golem.evaluation.rungs.walk_twist import command
+from golem.evaluation.rungs.walking import command
 
 METHODS = Path(__file__).parents[1] / "leg_methods.py"
 ENVELOPE = Envelope((-0.4, 0.8), (-0.3, 0.3), (-0.6, 0.6))
@@ -26,8 +26,8 @@ def short(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(stand_minute, "MINUTE", 8.0)
     monkeypatch.setattr(stand_minute.StandQuiet, "settle", 4.0)
     monkeypatch.setattr(stand_minute.StandArms, "settle", 3.0)
-    monkeypatch.setattr(walk_endurance, "MINUTE", 8.0)
-    monkeypatch.setattr(walk_rough, "SECONDS", 6.0)
+    monkeypatch.setattr(walking, "MINUTE", 8.0)
+    monkeypatch.setattr(walking, "SECONDS", 6.0)
 
 
 def run(rung: str, method: str, index: int = 0, profile: str = "ideal", **options: Any) -> TrialOutcome:
@@ -136,7 +136,7 @@ def test_rough_ground_is_walked_over(ground: str, climbed: float) -> None:
 
 def test_every_ground_is_another_twin_and_an_unknown_one_is_refused() -> None:
     facts = make_rung(RUNGS["walk-rough"]).config("almi", "bench", {})
-    assert list(facts) == list(walk_rough.GROUNDS) and len({str(f) for f in facts.values()}) == len(facts)
+    assert list(facts) == list(walking.GROUNDS) and len({str(f) for f in facts.values()}) == len(facts)
     with pytest.raises(ConfigError, match="Unknown ground 'ice'.*slippery"):
         make_rung(RUNGS["walk-rough"], {"ground": ["ice"]})
 
@@ -151,7 +151,7 @@ def test_poses_are_reached_as_precisely_and_as_surely_as_in_199_of_200_trials(co
     errors = [trial.series["goal_radial"] for trial in trials]
     assert len(arrived) >= min(count, 3), [trial.detail for trial in trials]
     assert 0.0 < min(errors) and max(errors) < 2 * 0.054 and sum(errors) / len(errors) < 2 * 0.020
-    assert all(4.0 < trial.timings["walk"] <= walk_stop.TIMEOUT for trial in arrived)
+    assert all(4.0 < trial.timings["walk"] <= walking.TIMEOUT for trial in arrived)
 
 
 @pytest.mark.slow

@@ -10,8 +10,7 @@ import pytest
 
 from golem.evaluation.base import TrialSpec
 from golem.evaluation.episodes.episode import Loss
-from golem.evaluation.rungs.push import MIN_PEAK, PEAK, PushRung, judge
-from golem.evaluation.rungs.push_ramp import MAX_FORCE, RATE, PushRampRung
+from golem.evaluation.rungs.push import MAX_FORCE, MIN_PEAK, PEAK, RATE, PushRampRung, PushRung, judge
 from golem.robots.mujoco.balance import TRACE, BalanceTrace
 from golem.robots.mujoco.shoves import DIRECTIONS, ROD_TIME, rod
 

@@ -10,10 +10,9 @@ import pytest
 from golem.capabilities.memory.frame_index import FrameIndex
 from golem.capabilities.memory.object_map import ObjectMap
 from golem.evaluation.base import TrialSpec, make_rung
-from golem.evaluation.episodes.memory_timeline import timeline
 from golem.evaluation.episodes.relocation import Relocation, Setting, relocation
 from golem.evaluation.report.svg_figure import page_figure, styled
-from golem.evaluation.rungs.spatial_memory import CONDITIONS, ask
+from golem.evaluation.rungs.spatial_memory import CONDITIONS, ask, timeline
 
 
 @pytest.fixture(scope="module")

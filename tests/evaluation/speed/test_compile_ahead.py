@@ -46,5 +46,5 @@ def test_no_kernel_is_left_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     # What estimators call outside of the chain: the chain calls `contact` and `fuse`.
     assert set(found.stdout.split()) <= {
         "golem.hardware.estimator.feet_kernel.contacts",
-        "golem.hardware.estimator.random_walk._fuse_all",
+        "golem.hardware.estimator.random_walk_kf._fuse_all",
     }

@@ -14,7 +14,7 @@ from tests.hardware.estimator.sensed_feet import Feet
 
 from golem.hardware.estimator.attitude import GYRO_BIAS, Attitude, track_bias
 from golem.hardware.estimator.feet import FeetConfig
-from golem.hardware.estimator.random_walk import base_velocity
+from golem.hardware.estimator.random_walk_kf import base_velocity
 from golem.native import new_record
 from golem.robots.model.imu_mount import TORSO, base_rate
 from golem.robots.model.spatial import rotation_rpy

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from golem.hardware.estimator.feet import Contact, ContactConfig
-from golem.hardware.estimator.random_walk import (
+from golem.hardware.estimator.random_walk_kf import (
     FILTER,
     RandomWalk,
     RandomWalkConfig,

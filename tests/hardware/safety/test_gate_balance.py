@@ -12,7 +12,7 @@ from golem.hardware.safety.base import SafetyLimits
 from golem.hardware.safety.gate_balance import carried, no_balance, sensed, unbalanced
 from golem.interfaces.payloads import Reason
 from golem.native import Records
-from golem.robots.model.kinematics import Kinematics
+from golem.robots.model.pinocchio_model import Kinematics
 from golem.types import Array, LowState
 
 LIMITS, DT = SafetyLimits.from_profile(), 0.01

@@ -5,8 +5,7 @@ import pytest
 
 from golem.errors import ConfigError
 from golem.hardware.safety.base import SafetyLimits
-from golem.robots.model.limits import load_limits
-from golem.robots.model.table import JOINT_NAMES
+from golem.robots.model.table import JOINT_NAMES, load_limits
 
 
 @pytest.mark.parametrize("profile", ["urdf", "paper"])

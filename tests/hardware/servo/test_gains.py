@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from golem.hardware.servo.gains import default_gains
-from golem.robots.model.limits import load_limits
+from golem.robots.model.table import load_limits
 from golem.types import LEGS, UPPER
 
 

@@ -5,8 +5,8 @@ import pinocchio as pin
 import pytest
 
 from golem.hardware.servo.gravity import Gravity
-from golem.robots.model.limits import load_limits
 from golem.robots.model.pinocchio_model import build
+from golem.robots.model.table import load_limits
 
 
 @pytest.mark.parametrize("hands", [True, False])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from golem.middleware.ros.definitions import nested
-from golem.middleware.ros.message_class import ARRAY, BASE, NAME, SEQUENCE, Definition
+from golem.middleware.ros.message import ARRAY, BASE, NAME, SEQUENCE, Definition
 
 _PRIMITIVES = {
     "bool": "boolean",

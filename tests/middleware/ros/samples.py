@@ -10,7 +10,7 @@ import numpy as np
 
 from golem.middleware.ros.codec import Codec
 from golem.middleware.ros.definitions import EMPTY_MEMBER
-from golem.middleware.ros.message_class import ARRAY, BASE, NAME
+from golem.middleware.ros.message import ARRAY, BASE, NAME
 
 INTEGERS = {"byte": "b", "int8": "b", "uint8": "B", "int16": "h", "uint16": "H", "int32": "i", "uint32": "I"} | {
     "int64": "q",

@@ -17,8 +17,7 @@ from tests.middleware.ros.samples import random_message, travelling
 from golem.middleware.ros import codec
 from golem.middleware.ros.codec import Codec
 from golem.middleware.ros.definitions import EMPTY_MEMBER
-from golem.middleware.ros.message import CodecError, Message
-from golem.middleware.ros.message_class import python_name
+from golem.middleware.ros.message import CodecError, Message, python_name
 from golem.middleware.ros.msgs.geometry_msgs import Quaternion, Twist, Vector3
 from golem.middleware.ros.msgs.golem_interfaces import HandState, Pick_Goal, SafetyStatus
 from golem.middleware.ros.msgs.sensor_msgs import Image, JointState

@@ -17,7 +17,7 @@ pytest.importorskip("rosbags")
 from tests.middleware.ros.samples import mutated, random_message, travelling
 
 from golem.interfaces import images, public
-from golem.interfaces.lens import to_lens
+from golem.interfaces.images import to_lens
 from golem.interfaces.ros_convert import (
     to_base_estimate,
     to_gate_status,

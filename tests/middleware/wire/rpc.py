@@ -7,8 +7,7 @@ import time
 
 from golem.middleware.dds.base import CALLS, Participant
 from golem.middleware.wire import api
-from golem.middleware.wire.api import ApiRequest, Response, request_topic, response_topic
-from golem.middleware.wire.rpc import RpcClient, RpcServer
+from golem.middleware.wire.api import ApiRequest, Response, RpcClient, RpcServer, request_topic, response_topic
 
 POLL = 0.0005
 

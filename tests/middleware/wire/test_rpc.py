@@ -13,8 +13,7 @@ from golem.interfaces.unitree_api import OK
 from golem.middleware.dds.base import DEFAULT, Participant
 from golem.middleware.dds.local import LocalDomain
 from golem.middleware.wire import api
-from golem.middleware.wire.api import ApiRequest, Response
-from golem.middleware.wire.rpc import RpcServer
+from golem.middleware.wire.api import ApiRequest, Response, RpcServer
 
 SERVICE = "loco"
 

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from golem.robots.model import mjcf
-from golem.robots.model.limits import load_limits
-from golem.robots.model.table import JOINT_NAMES
+from golem.robots.model.table import JOINT_NAMES, load_limits
 from golem.types import Array
 
 

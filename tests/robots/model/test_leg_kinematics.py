@@ -2,8 +2,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from golem.robots.model.kinematics import Kinematics
 from golem.robots.model.leg_kinematics import leg_poses, sole_centers
+from golem.robots.model.pinocchio_model import Kinematics
 from golem.types import NUM_JOINTS, SIDES
 
 

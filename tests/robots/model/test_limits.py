@@ -5,8 +5,7 @@ import pytest
 
 from golem.errors import ConfigError
 from golem.robots.model import mjcf
-from golem.robots.model.limits import load_limits
-from golem.robots.model.table import JOINT_INDEX
+from golem.robots.model.table import JOINT_INDEX, load_limits
 
 
 def test_default_is_the_lower_of_the_two_sources() -> None:

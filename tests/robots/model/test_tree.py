@@ -8,7 +8,7 @@ import numpy as np
 
 from golem.robots.model import magpie_model, tree
 from golem.robots.model.export import export_urdf
-from golem.robots.model.kinematics import Kinematics
+from golem.robots.model.pinocchio_model import Kinematics
 from golem.robots.model.spatial import rotation_rpy, transform
 from golem.types import NUM_JOINTS, Array
 

@@ -11,8 +11,7 @@ import pytest
 
 from golem.errors import ConfigError
 from golem.robots.base import Robot
-from golem.robots.model.limits import load_limits
-from golem.robots.model.table import JOINT_NAMES
+from golem.robots.model.table import JOINT_NAMES, load_limits
 from golem.robots.mujoco import engine
 from golem.robots.mujoco.engine import MujocoConfig, MujocoRobot
 from golem.robots.mujoco.hoist import HoistConfig

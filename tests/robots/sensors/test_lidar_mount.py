@@ -6,7 +6,7 @@ import numpy as np
 
 from golem.capabilities.calibration.kinematic_fit import pose
 from golem.interfaces.lidar import LidarImu, LidarScan
-from golem.robots.sensors.lidar_mount import LidarCorrection
+from golem.robots.sensors.calibration import LidarCorrection
 
 
 def test_points_and_axes_are_turned_and_moved() -> None:

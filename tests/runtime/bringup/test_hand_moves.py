@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from golem.robots.model.limits import load_limits
-from golem.robots.model.table import JOINT_INDEX, JOINT_NAMES
+from golem.robots.model.table import JOINT_INDEX, JOINT_NAMES, load_limits
 from golem.runtime.bringup.bringup_command import hand_move, motion_words, wrong_with
 from golem.types import NUM_JOINTS, TICK, Imu, LowState
 

@@ -33,7 +33,7 @@ from golem.middleware.ros.action_client import ClientGoal
 from golem.middleware.ros.definitions import EMPTY_MEMBER
 from golem.middleware.ros.future import Future
 from golem.middleware.ros.goals import GoalStatus
-from golem.middleware.ros.message_class import ARRAY, BASE, NAME, numpy_name, python_name
+from golem.middleware.ros.message import ARRAY, BASE, NAME, numpy_name, python_name
 from golem.middleware.ros.msgs.geometry_msgs import PoseStamped
 from golem.middleware.ros.msgs.golem_interfaces import (
     Pick_Goal,

@@ -22,7 +22,7 @@ from golem.middleware.ros.goals import GoalStatus
 from golem.middleware.ros.msgs import geometry_msgs
 from golem.middleware.ros.node import RosNode
 from golem.runtime.live.nav2_bridge import ACTION, TYPE, VELOCITY, Nav2Bridge
-from golem.runtime.nav2_link import BusNav2
+from golem.runtime.navigator_node import BusNav2
 from golem.types import PlanarPose, Twist
 
 GOAL = PlanarPose(2.0, 1.0, 0.5)

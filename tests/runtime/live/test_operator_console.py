@@ -8,7 +8,7 @@ from typing import Any
 from tests.runtime.live.conftest import Live
 
 from golem.interfaces.payloads import GateState
-from golem.runtime.live.operator_console import Console
+from golem.runtime.live.operator import Console
 from golem.types import TICK
 
 

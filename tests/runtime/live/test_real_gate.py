@@ -17,8 +17,7 @@ from golem.middleware.dds.local import LocalReader
 from golem.middleware.ros.msgs.std_srvs import Trigger_Request
 from golem.middleware.wire import convert as wire
 from golem.middleware.wire import hg
-from golem.middleware.wire.api import ApiRequest
-from golem.middleware.wire.rpc import RpcServer
+from golem.middleware.wire.api import ApiRequest, RpcServer
 from golem.robots.unitree import motion_switcher
 from golem.runtime.live import motion_switcher_client
 from golem.runtime.live.safety_arrivals import Arrivals

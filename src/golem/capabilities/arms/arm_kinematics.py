@@ -8,8 +8,7 @@ import pinocchio as pin
 from golem.capabilities.arms.base import ARM_COLUMNS, GRIPPER_FRAME
 from golem.hardware.safety.base import SafetyLimits
 from golem.robots.model import pinocchio_model
-from golem.robots.model.limits import load_limits
-from golem.robots.model.table import JOINT_NAMES
+from golem.robots.model.table import JOINT_NAMES, load_limits
 from golem.types import LEGS, SIDES, UPPER, Array, Side
 
 

@@ -13,7 +13,7 @@ from golem.capabilities.arms.postures import POSTURES
 from golem.capabilities.arms.task_space import TaskSpaceConfig
 from golem.types import NUM_JOINTS, SIDES, UPPER, Array, Side
 
-# As in `solve`: free of speed limits, one tick of dt = 1 s is one bounded Gauss-Newton step.
+# Free of speed limits, one tick of dt = 1 s is one bounded Gauss-Newton step.
 _OFFLINE = TaskSpaceConfig(
     arm_speed=0.5, torso_speed=0.2, posture_weight=1e-5, torso_weight=1e-4, palm_speed=0.2, palm_turn=1.0,
     error_damping=1e-2, collision_rows=0,

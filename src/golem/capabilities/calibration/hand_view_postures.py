@@ -21,8 +21,8 @@ from golem.capabilities.calibration.view_postures import (
     telling,
 )
 from golem.hardware.safety.base import SafetyLimits
-from golem.robots.model.kinematics import Kinematics
 from golem.robots.model.magpie_model import T_HAND_CAMERA
+from golem.robots.model.pinocchio_model import Kinematics
 from golem.robots.model.tag_cuff import cuff_tags
 from golem.robots.sensors.cameras import CAMERAS, project
 from golem.types import NUM_JOINTS, SIDES, UPPER, Array, Side

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from golem.capabilities.arms.postures import posture
 from golem.capabilities.calibration.kinematic_fit import information
-from golem.robots.model.kinematics import Kinematics
 from golem.robots.model.magpie_model import T_HAND_GRIPPER, T_WRIST_HAND
+from golem.robots.model.pinocchio_model import Kinematics
 from golem.robots.model.table import JOINTS, T_TORSO_HEAD_OPTICAL
 from golem.robots.model.tag_cuff import cuff_tags
 from golem.robots.sensors.cameras import HEAD, project

@@ -22,8 +22,14 @@ from rich.console import Console
 from rich.table import Table
 from tqdm import tqdm
 
-from golem.capabilities.collision.link_poses import free_links, hold_joints, joint_names, link_poses, neighbours
-from golem.capabilities.collision.mesh_oracle import MeshOracle
+from golem.capabilities.collision.link_poses import (
+    MeshOracle,
+    free_links,
+    hold_joints,
+    joint_names,
+    link_poses,
+    neighbours,
+)
 from golem.capabilities.collision.packing_report import CollisionScore, LinkCoverage, coverage, score_collisions
 from golem.capabilities.collision.sphere_packer import Packing, SphereKind, pack
 from golem.capabilities.collision.sphere_robot import SphereRobot, save_spheres, without_surfaces

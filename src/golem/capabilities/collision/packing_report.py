@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from golem.capabilities.collision.link_poses import link_poses
-from golem.capabilities.collision.mesh_oracle import MeshOracle
+from golem.capabilities.collision.link_poses import MeshOracle, link_poses
 from golem.capabilities.collision.sphere_packer import Packing
 from golem.capabilities.collision.sphere_robot import SphereRobot, sphere_columns
 from golem.capabilities.collision.surface import LinkSurface

@@ -15,7 +15,7 @@ import numpy as np
 from golem import registry
 from golem.capabilities.arms.postures import POSTURES
 from golem.capabilities.arms.quick_ik import TURNS, QuickIK
-from golem.capabilities.collision.scene_cloud import scene_world
+from golem.capabilities.collision.obstacles import scene_world
 from golem.capabilities.grasping.base import Grasp, GraspMethod, Gripper, ServoLaw
 from golem.capabilities.grasping.centroid import ACROSS
 from golem.capabilities.grasping.object_cloud import room_around

@@ -16,8 +16,7 @@ from scipy.signal import butter, sosfiltfilt
 from golem.capabilities.identification import regressor as r
 from golem.capabilities.identification.recording import IdentificationError, RecordedMotion
 from golem.capabilities.identification.regressor import HangingTree
-from golem.robots.model.limits import load_limits
-from golem.robots.model.table import JOINT_NAMES
+from golem.robots.model.table import JOINT_NAMES, load_limits
 from golem.types import NUM_JOINTS, TICK, Array
 
 CUTOFF, STRIDE, ROUNDS = 6.0, 10, 4

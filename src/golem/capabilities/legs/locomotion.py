@@ -19,10 +19,9 @@ import numpy as np
 
 from golem.capabilities.legs.base import STANDING, ZERO, LocomotionCommand, LowerBody, follows
 from golem.capabilities.legs.gait import Bools, Gait
-from golem.capabilities.legs.gait_clock import GaitClock
+from golem.capabilities.legs.gait_clock import GaitClock, StopPredictor
 from golem.capabilities.legs.handover import CommandBlender
 from golem.capabilities.legs.rate_divider import RateDivider
-from golem.capabilities.legs.stop_predictor import StopPredictor
 from golem.capabilities.legs.velocity_integrator import VelocityIntegrator, VelocityIntegratorConfig
 from golem.interfaces.payloads import LegCommand
 from golem.options import require

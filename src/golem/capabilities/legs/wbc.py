@@ -26,8 +26,7 @@ from golem.capabilities.legs.wbc_qp import NUM_LEGS, QpWeights, Solution, Stance
 from golem.errors import ConfigError, GolemError, unknown_name
 from golem.interfaces.payloads import LegCommand
 from golem.robots.model.imu_mount import sensed_base_rate
-from golem.robots.model.limits import load_limits
-from golem.robots.model.table import JOINT_NAMES
+from golem.robots.model.table import JOINT_NAMES, load_limits
 from golem.types import LEGS, Array, BaseEstimate, LowState
 
 _SLIP = np.array([0.003, 0.003, 0.02])
@@ -60,7 +59,7 @@ class WbcConfig:
             so that it only acts on what happens between two ticks.
         friction: coefficient the feet may rely on; the soles have 0.8, and the inscribed pyramid keeps less.
         sole_margin: how far the centre of pressure stays inside the edge of a sole [m].
-        torque_profile: a profile of `robots.model.limits`.
+        torque_profile: a profile of `robots.model.table`.
         torque_ratio: share of those limits that is used. 0.85 is just below what the safety gate lets through.
         weights: of the tasks.
         engage: time in which feet that were not loaded get their torques [s].

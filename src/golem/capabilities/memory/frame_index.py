@@ -15,7 +15,7 @@ import numpy as np
 
 from golem.capabilities.memory.base import Observation, Place, When, apart, check_observation, check_query
 from golem.capabilities.memory.words import label_scores
-from golem.capabilities.perception.hub_model import load_model
+from golem.capabilities.perception.open_words import load_model
 from golem.errors import ConfigError, unknown_name
 from golem.types import Array
 

@@ -1,4 +1,4 @@
-"""A file of remembered objects."""
+"""A file of remembered objects, in SQLite, and its records."""
 
 from __future__ import annotations
 

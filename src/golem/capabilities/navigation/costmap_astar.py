@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from golem.capabilities.navigation.astar import Cell, astar
+from golem.capabilities.navigation.astar import Cell, Way, astar
 from golem.capabilities.navigation.base import NavInputs
 from golem.capabilities.navigation.behaviour import Action, BehaviourStatus, Fallback, InSequence
 from golem.capabilities.navigation.costmap import INSCRIBED, LETHAL, STEEPEST, Costmap, CostmapConfig
@@ -19,7 +19,6 @@ from golem.capabilities.navigation.footprint import HOME, Footprint
 from golem.capabilities.navigation.goto import GoTo, GoToConfig
 from golem.capabilities.navigation.local_controller import LocalController, LocalControllerConfig
 from golem.capabilities.navigation.surroundings import Surroundings
-from golem.capabilities.navigation.way import Way
 from golem.finite import check_finite
 from golem.interfaces.nav_payloads import NavStep, Scan
 from golem.options import require
@@ -270,7 +269,7 @@ class CostmapAstar:
 
     @property
     def _people(self) -> Array:
-        """Those who walk now; see `rollout.score`."""
+        """Those who walk now; see `local_controller.score`."""
         return self._surroundings.people(self._scan_age)
 
     @property

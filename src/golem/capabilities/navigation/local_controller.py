@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from golem.capabilities.navigation.astar import Way
 from golem.capabilities.navigation.footprint import Footprint
-from golem.capabilities.navigation.way import Way
 from golem.kernels import njit
 from golem.options import require
 from golem.types import Array, PlanarPose, Twist, wrap
@@ -154,7 +154,7 @@ WEIGHTS = (1.0, 0.5, 0.03)
 
 
 class LocalController:
-    """Chooses among twists by what they lead to; see `rollout.score`."""
+    """Chooses among twists by what they lead to; see `local_controller.score`."""
 
     def __init__(self, config: LocalControllerConfig) -> None:
         """Prepare the twists that are tried."""
@@ -189,7 +189,7 @@ class LocalController:
             way: where to go.
             goal: where that ends.
             footprint: of the robot.
-            clearance: of the window around the robot, see `rollout.score`.
+            clearance: of the window around the robot, see `local_controller.score`.
             frame: of that window.
             people: those who walk, likewise.
         """

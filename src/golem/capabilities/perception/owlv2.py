@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from golem.capabilities.perception.hub_model import load_model
-from golem.capabilities.perception.open_words import OpenWords, OpenWordsConfig
+from golem.capabilities.perception.open_words import OpenWords, OpenWordsConfig, load_model
 
 
 class Owlv2(OpenWords):

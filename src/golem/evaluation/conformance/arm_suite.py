@@ -14,8 +14,8 @@ from golem.evaluation.conformance import samples
 from golem.evaluation.conformance.base import Candidate, check
 from golem.evaluation.conformance.suite import Suite
 from golem.interfaces.payloads import ArmCommand
-from golem.robots.model.kinematics import Kinematics
-from golem.robots.model.limits import load_limits
+from golem.robots.model.pinocchio_model import Kinematics
+from golem.robots.model.table import load_limits
 from golem.runtime.arm_limits import ArmLimits
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.nodes import MIN_RATE

@@ -15,7 +15,7 @@ from golem.evaluation.conformance.base import Candidate, check
 from golem.evaluation.conformance.still_robot import StillOnboard
 from golem.evaluation.conformance.suite import Suite
 from golem.interfaces.payloads import LegCommand
-from golem.robots.model.limits import load_limits
+from golem.robots.model.table import load_limits
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.lower_body_node import MAX_LATENCY
 from golem.runtime.nodes import MIN_RATE

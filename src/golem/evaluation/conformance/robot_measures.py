@@ -16,7 +16,7 @@ from golem.evaluation.conformance.robot_rig import OPEN, Path, RobotRig
 from golem.hardware.safety.base import SafetyLimits
 from golem.hardware.servo.gravity import Gravity
 from golem.robots.model.imu_mount import TORSO
-from golem.robots.model.kinematics import Kinematics
+from golem.robots.model.pinocchio_model import Kinematics
 from golem.robots.model.table import JOINT_INDEX, JOINT_NAMES
 from golem.robots.sensors.calibration import OPTICAL_FRAMES
 from golem.robots.sensors.cameras import project

@@ -10,7 +10,7 @@ import numpy as np
 
 from golem.capabilities.arms.postures import POSTURES
 from golem.capabilities.legs.hold import STANCES
-from golem.robots.model.limits import load_limits
+from golem.robots.model.table import load_limits
 from golem.robots.sensors.cameras import HEAD, rays
 from golem.types import (
     LEGS,

@@ -12,7 +12,7 @@ import numpy as np
 from golem.capabilities.arms.base import ARM_COLUMNS
 from golem.capabilities.arms.postures import POSTURES, mirror
 from golem.capabilities.arms.trajectory import gate_limits
-from golem.robots.model.kinematics import Kinematics
+from golem.robots.model.pinocchio_model import Kinematics
 from golem.robots.model.table import JOINTS
 from golem.types import NUM_JOINTS, UPPER, Array, PlanarPose, Twist
 

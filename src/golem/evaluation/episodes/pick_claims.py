@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from golem.capabilities.arms.reach_map import load_map
-from golem.skills.pick_report import PickOutcome, PickReport, Sight, Tried
+from golem.skills.pick_config import PickOutcome, PickReport, Sight, Tried
 from golem.types import SIDES, Array
 
 SEEN = 0.045

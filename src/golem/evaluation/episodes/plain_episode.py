@@ -20,7 +20,7 @@ from golem.errors import ConfigError, ModuleFault
 from golem.evaluation.episodes.episode import LOWER, NO_HEIGHT, Loss, with_legs
 from golem.hardware.servo.gains import default_gains
 from golem.interfaces.payloads import LegCommand
-from golem.robots.model.limits import load_limits
+from golem.robots.model.table import load_limits
 from golem.robots.mujoco.balance import BalanceRecorder
 from golem.robots.mujoco.plain_robot import PlainRobot
 from golem.robots.mujoco.shoves import Push, Pusher

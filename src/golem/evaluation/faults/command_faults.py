@@ -17,8 +17,7 @@ from golem.evaluation.faults.injection import (
     edited_command,
 )
 from golem.interfaces.payloads import Reason
-from golem.robots.model.limits import load_limits
-from golem.robots.model.table import JOINT_INDEX
+from golem.robots.model.table import JOINT_INDEX, load_limits
 from golem.types import LEGS, NUM_JOINTS, UPPER
 
 JOINTS = (

@@ -15,8 +15,7 @@ from golem.evaluation.faults.injection import Expect, FaultSource, Injection
 from golem.evaluation.faults.rig import FaultRig
 from golem.interfaces import topics
 from golem.interfaces.payloads import GateState, Reason
-from golem.robots.model.limits import load_limits
-from golem.robots.model.table import JOINT_NAMES
+from golem.robots.model.table import JOINT_NAMES, load_limits
 from golem.types import TICK, LowCommand
 
 MARGIN = 1.05

@@ -21,7 +21,7 @@ from golem.evaluation.metrics.summary import Summary, comparisons_of, row
 from golem.evaluation.metrics.tables import comparisons
 from golem.evaluation.metrics.text_table import TextTable
 from golem.evaluation.report.html_page import render_page
-from golem.evaluation.report.ladder_plots import failure_plot
+from golem.evaluation.report.ladder_report import failure_plot
 from golem.evaluation.report.margin_plot import MarginBox, kept_traces, margin_box, margin_boxes
 from golem.evaluation.report.svg_figure import styled
 from golem.options import fill

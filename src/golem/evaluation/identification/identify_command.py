@@ -21,8 +21,7 @@ from golem.middleware.bags.writer import BagWriter
 from golem.output_file import write_file
 from golem.robots.model import mjcf
 from golem.robots.model.imu_mount import TORSO
-from golem.robots.model.limits import load_limits
-from golem.robots.model.table import JOINT_NAMES
+from golem.robots.model.table import JOINT_NAMES, load_limits
 from golem.robots.mujoco.motors import Motors
 from golem.robots.sensors.profiles import MOTORS
 from golem.runtime.live.broadcast import Broadcast

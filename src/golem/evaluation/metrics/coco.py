@@ -1,4 +1,4 @@
-"""Images with labelled boxes, and the average precision of detections against them."""
+"""Images with labelled boxes, from folders in COCO format, and the average precision of detections against them."""
 
 from __future__ import annotations
 

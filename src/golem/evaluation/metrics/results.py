@@ -107,7 +107,7 @@ def run_results(config: ResultsConfig) -> str:
     else:
         write_file(config.out, text)
     if config.figures is not None:
-        from golem.evaluation.report.ladder_plots import standalone_figures
+        from golem.evaluation.report.ladder_report import standalone_figures
 
         for folder in config.runs:
             for name, picture in standalone_figures(_records(folder)).items():

@@ -15,8 +15,7 @@ from golem.errors import ConfigError
 from golem.evaluation.passport.base import Mistake
 from golem.evaluation.passport.repairs import Repair, repairs
 from golem.evaluation.passport.trial import SOUND, Floor, Trial, walk
-from golem.robots.model.limits import load_limits
-from golem.robots.model.table import JOINT_NAMES
+from golem.robots.model.table import JOINT_NAMES, load_limits
 from golem.types import LEGS, Array
 
 STIFFNESS = (5.0, 2000.0)

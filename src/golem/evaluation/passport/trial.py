@@ -1,4 +1,4 @@
-"""A policy walks on the floor for a few seconds: whether it stays up, and whether it goes where it is told."""
+"""A policy walks on a plain floor for a few seconds: whether it stays up, and whether it goes where it is told."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from golem.errors import ConfigError
 from golem.evaluation.base import Case, Results, TrialOutcome, TrialSpec
 from golem.evaluation.episodes.episode import Episode, episode_seed
 from golem.evaluation.rungs.leg_rung import LegRung, PlantOptions, judged
-from golem.evaluation.rungs.walk_twist import SETTLE
+from golem.evaluation.rungs.walking import SETTLE
 from golem.evaluation.speed.bench import stopwatch
 from golem.options import fill
 from golem.stack import Choice

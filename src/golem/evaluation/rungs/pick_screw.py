@@ -26,8 +26,7 @@ from golem.evaluation.episodes.episode import HANGS, READY, Loss, episode_seed, 
 from golem.evaluation.episodes.oracle import Oracle
 from golem.evaluation.episodes.pick_blame import blame
 from golem.evaluation.episodes.pick_claims import REFUSALS, Fastener, claims
-from golem.evaluation.episodes.pick_touches import PickTouches
-from golem.evaluation.episodes.pick_watch import PickWatch
+from golem.evaluation.episodes.pick_watch import PickTouches, PickWatch
 from golem.evaluation.episodes.true_masks import build_seeing, with_modules
 from golem.evaluation.harness.arguments import read_sweep
 from golem.evaluation.metrics.text_table import TextTable
@@ -40,8 +39,7 @@ from golem.robots.worlds.conditions import Conditions, LayoutKind, draw_conditio
 from golem.runtime.executor import when_stepped
 from golem.runtime.lockstep import LockstepRunner
 from golem.skills.base import FAULT, SkillResult
-from golem.skills.pick_config import PickGoal
-from golem.skills.pick_report import PickOutcome, PickReport
+from golem.skills.pick_config import PickGoal, PickOutcome, PickReport
 from golem.slots import KEYS
 from golem.stack import Stack, load_stack
 from golem.types import SIDES, Array, Side

@@ -1,4 +1,4 @@
-"""Rung `push`: the paper's rod pushes the standing robot at the pelvis; one lower body per method."""
+"""Rungs `push` and `push-ramp`: the paper's rod pushes the standing robot at the pelvis; one lower body per method."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from golem.evaluation.episodes.film_strip import FilmStrip
 from golem.evaluation.episodes.scripted_motion import ArmMotion, ScriptedMotion
 from golem.evaluation.rungs.leg_rung import LegRung, PlantOptions
 from golem.robots.mujoco.balance import TRACE, BalanceTrace
-from golem.robots.mujoco.shoves import DIRECTIONS, Push, rod
+from golem.robots.mujoco.shoves import DIRECTIONS, Push, ramp, rod
 from golem.runtime.executor import when_stepped
 from golem.skills.runner import FAULT
 
@@ -122,3 +122,39 @@ def judge(trace: BalanceTrace, start: float, push: Push, loss: Loss | None, rest
     # A robot that never lost its balance has none to recover.
     timings = {"recovery": recovery} if recovery > 0.0 else {}
     return TrialOutcome(True, DONE, None, f"stands, {pushed}", timings, series)
+
+
+RATE = 40.0
+"""Growth of the force [N/s] [own: a person's; the paper does not say]."""
+MAX_FORCE = 300.0
+"""Force at which the push ends although the balance is not lost [N] [own: nearly half the robot's weight]."""
+
+
+class PushRampRung(PushRung):
+    """Stand again after the rod has pushed harder and harder until the CoM left the support polygon.
+
+    The paper's robots were pushed so by hand: "until the robot loses balance", by a margin that becomes negative. Who
+    steps is pushed on while the polygon follows, so `peak_force` says what a method takes, and the rest of the figures
+    what it makes of a balance that is lost.
+    """
+
+    name = "push-ramp"
+
+    def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
+        """Return what determines a trial besides its seed; see `Rung`."""
+        return {**super().config(method, profile, overrides), "peak": (MAX_FORCE, RATE)}
+
+    def draw(self, rng: np.random.Generator) -> tuple[Push, float]:
+        """Return the push of one trial, and the time before it [s]."""
+        direction = DIRECTIONS[rng.integers(len(DIRECTIONS))]
+        return ramp(direction, MAX_FORCE, MAX_FORCE / RATE), float(rng.uniform(*SETTLE))
+
+    def pursue(self, episode: Episode, strip: FilmStrip) -> None:
+        """Push until the balance is lost, and keep pictures of what comes then."""
+        strip.keep(episode.t, episode.force)
+        episode.run(MAX_FORCE / RATE, until=lambda: episode.recorder.margin < 0.0, due=when_stepped)
+        strip.keep(episode.t, episode.force)
+        episode.let_go()
+        for seconds in MOMENTS[:-1]:
+            episode.run(seconds)
+            strip.keep(episode.t, episode.force)

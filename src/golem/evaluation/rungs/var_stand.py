@@ -20,8 +20,7 @@ from golem.evaluation.episodes.contacts import ContactWatch
 from golem.evaluation.episodes.episode import Episode, Loss, episode_seed, lost
 from golem.evaluation.episodes.oracle import Oracle, place_error
 from golem.evaluation.episodes.pick_claims import claims
-from golem.evaluation.episodes.pick_touches import PickTouches
-from golem.evaluation.episodes.pick_watch import PickWatch
+from golem.evaluation.episodes.pick_watch import PickTouches, PickWatch
 from golem.evaluation.episodes.survey import survey
 from golem.evaluation.rungs.navigate_hall import DISTANCE, GUESS, SPREAD
 from golem.evaluation.rungs.pick_screw import SETTLE, PickOptions, PickRung, balance, judge_pick
@@ -36,8 +35,7 @@ from golem.skills.context import Context
 from golem.skills.disassemble_goal import DisassembleGoal, DisassembleReport
 from golem.skills.navigate import NavigateGoal
 from golem.skills.pack_job import CONTENT, STAGE
-from golem.skills.pick_config import PickGoal
-from golem.skills.pick_report import PickOutcome, PickReport
+from golem.skills.pick_config import PickGoal, PickOutcome, PickReport
 from golem.stack import Stack, load_stack
 from golem.types import SIDES, Array, PlanarPose
 

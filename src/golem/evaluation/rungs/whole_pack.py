@@ -18,7 +18,7 @@ from golem.evaluation.episodes.contacts import ContactWatch
 from golem.evaluation.episodes.episode import Episode, episode_seed
 from golem.evaluation.episodes.gantry_cell import GantryCell
 from golem.evaluation.episodes.oracle import Oracle, Whereabouts, whereabouts
-from golem.evaluation.episodes.pick_touches import PickTouches
+from golem.evaluation.episodes.pick_watch import PickTouches
 from golem.evaluation.metrics.text_table import TextTable
 from golem.evaluation.rungs.pick_screw import SETTLE
 from golem.evaluation.rungs.var_stand import STILL, VarStandRung

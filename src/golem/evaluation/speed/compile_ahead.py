@@ -25,8 +25,8 @@ from golem.capabilities.planning import plan_kernel
 from golem.capabilities.planning.base import PlanRefused
 from golem.capabilities.planning.joint_space import PlanningRobot
 from golem.capabilities.planning.rrt_connect import RrtConnect
+from golem.evaluation.speed.arms_bench import queries
 from golem.evaluation.speed.navigation_bench import navigation_times
-from golem.evaluation.speed.plan_bench import queries
 from golem.kernels import stamp_of_all
 from golem.runtime.lockstep import build
 from golem.stack import load_stack

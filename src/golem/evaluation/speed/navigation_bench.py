@@ -7,11 +7,10 @@ from collections.abc import Callable
 import numpy as np
 
 from golem.capabilities.mapping.voxel_grid import VoxelGridMapper
-from golem.capabilities.navigation.astar import astar
+from golem.capabilities.navigation.astar import Way, astar
 from golem.capabilities.navigation.costmap import INSCRIBED, Costmap
 from golem.capabilities.navigation.footprint import HOME
 from golem.capabilities.navigation.local_controller import LocalController, LocalControllerConfig
-from golem.capabilities.navigation.way import Way
 from golem.evaluation.conformance.room import HEIGHT, ROOM, MadeWalk
 from golem.interfaces.nav_payloads import OccupancyGrid, Scan
 from golem.types import Array, PlanarPose

@@ -1,4 +1,4 @@
-"""The compiled steps of `feet`, `foot_force` and `contact`, at 500 Hz; compiled once, then cached on disk.
+"""The compiled steps of `feet`, at 500 Hz; compiled once, then cached on disk.
 
 Loops in place of array expressions: numba compiles the messages of their shape errors, too, for seconds.
 """

@@ -307,7 +307,7 @@ def _code() -> Any:
 
 
 class InvariantEKF(CompiledEstimator):
-    """A right-invariant EKF in the frame of the IMU; see `BaseEstimator` and `invariant`.
+    """A right-invariant EKF in the frame of the IMU; see `BaseEstimator` and the head of this file.
 
     The waist turns about an axis through the origin of base_link, which therefore is a fixed point of the torso: from
     IMU to base_link there is a constant lever arm, and the joint only turns the axes and the feet.

@@ -1,6 +1,6 @@
 """The compiled steps of the invariant filter, at 500 Hz; compiled once, then cached on disk.
 
-State and covariance are changed in place. The order of the error, the equations and their source: see `invariant`.
+State and covariance are changed in place. The order of the error, the equations and their source: see `invariant_ekf`.
 """
 
 from __future__ import annotations

@@ -14,8 +14,7 @@ import numpy as np
 from golem.hardware.safety.limit_table import limit_table
 from golem.hardware.servo.gains import default_gains
 from golem.interfaces.payloads import EstopMessage, Fault
-from golem.robots.model.limits import load_limits
-from golem.robots.model.table import JOINT_NAMES
+from golem.robots.model.table import JOINT_NAMES, load_limits
 from golem.types import LEGS, NUM_JOINTS, UPPER, Array, BaseEstimate, LowCommand, LowState
 
 KP_MAX, KD_MAX = 500.0, 30.0
@@ -49,7 +48,7 @@ class OperatorRequest(StrEnum):
 class SafetyLimits:
     """Every number the gate compares with; arrays are (27,) in motor order and read-only.
 
-    Source of each: [profile] `golem.robots.model.limits`; [paper]; [authors] their published safety relay;
+    Source of each: [profile] `golem.robots.model.table`; [paper]; [authors] their published safety relay;
     [board] frame period of the e-stop firmware; [own] chosen here, with the reason.
 
     Attributes:

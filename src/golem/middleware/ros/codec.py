@@ -18,12 +18,13 @@ import numpy as np
 from golem.errors import unknown_name
 from golem.middleware.dds.base import Payload
 from golem.middleware.ros import definitions, msgs
-from golem.middleware.ros.message import CodecError, Message
-from golem.middleware.ros.message_class import (
+from golem.middleware.ros.message import (
     ARRAY,
     NAME,
     SEQUENCE,
+    CodecError,
     Definition,
+    Message,
     is_numeric,
     message_class,
     numpy_name,

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, cast, get_args
 
 from golem.errors import MissingExtra, unknown_name
 from golem.middleware.dds.domain import Distro
-from golem.middleware.ros.message_class import ARRAY, BASE, NAME, SEQUENCE, Definition, Kind
+from golem.middleware.ros.message import ARRAY, BASE, NAME, SEQUENCE, Definition, Kind
 
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore

@@ -7,9 +7,17 @@ import numpy as np
 
 from golem.robots.model import contact_shapes, looks, magpie_model
 from golem.robots.model.contact_shapes import Feet, Shape
-from golem.robots.model.limits import load_limits
 from golem.robots.model.spatial import Inertial, quat_of
-from golem.robots.model.table import BASE_HEIGHT, BASE_LINK, DOF, FRAMES, JOINTS, LINKS, T_TORSO_HEAD_OPTICAL
+from golem.robots.model.table import (
+    BASE_HEIGHT,
+    BASE_LINK,
+    DOF,
+    FRAMES,
+    JOINTS,
+    LINKS,
+    T_TORSO_HEAD_OPTICAL,
+    load_limits,
+)
 from golem.types import SIDES, Array, Side
 
 COLLISION_GROUP = 3
@@ -34,8 +42,8 @@ def robot_spec(
 
     Args:
         hands: with the MAGPIE hands and their cameras.
-        torque: profile of the torque limits, see `limits.load_limits`.
-        self_collision: legs, arms and trunk touch each other, see `contact.self_pairs`.
+        torque: profile of the torque limits, see `table.load_limits`.
+        self_collision: legs, arms and trunk touch each other, see `contact_shapes.self_pairs`.
         feet: what the soles are to the floor.
 
     Raises:

@@ -51,7 +51,7 @@ class MujocoConfig:
         hoist: how the robot is held.
         reach_y: near-edge fasteners with |y| up to this are loosened [m]; a varied layout draws among those up to
             `REACH_Y`. Of an ioniq5 those all round.
-        torque_profile: torque limits of the simulated motors (see `robots.model.limits`).
+        torque_profile: torque limits of the simulated motors (see `robots.model.table`).
         near: distance of a finger from a screw below which physics runs at the fine step [m].
         slope: inclination of the ramp [rad].
         step: height of the platform [m].

@@ -14,8 +14,7 @@ from golem.native import CompiledStage, address, new_record, own
 from golem.robots.model import magpie_model
 from golem.robots.model.imu_mount import torso_motion
 from golem.robots.model.leg_kinematics import leg_poses, sole_centers
-from golem.robots.model.limits import load_limits
-from golem.robots.model.table import BASE_LINK
+from golem.robots.model.table import BASE_LINK, load_limits
 from golem.robots.mujoco.camera import CameraRig
 from golem.robots.mujoco.config import WORKSHOPS, MujocoConfig
 from golem.robots.mujoco.external_forces import Pushes
@@ -41,7 +40,7 @@ from golem.robots.sensors.imu import ImuModel
 from golem.robots.sensors.mid360 import IMU_PERIOD
 from golem.robots.sensors.profiles import load_profile, sample_episode
 from golem.robots.sensors.streams import stream
-from golem.robots.worlds.dressing import mirror_geoms
+from golem.robots.worlds.hall import mirror_geoms
 from golem.types import LEGS, SIDES, UPPER, Array, HandCommand, HandState, Imu, LowCommand, Side
 
 START_GAP = 0.060

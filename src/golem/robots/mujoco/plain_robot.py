@@ -9,8 +9,7 @@ import numpy as np
 
 from golem.robots.model import mjcf
 from golem.robots.model.imu_mount import TORSO, torso_motion
-from golem.robots.model.limits import load_limits
-from golem.robots.model.table import BASE_LINK
+from golem.robots.model.table import BASE_LINK, load_limits
 from golem.robots.mujoco.balance import TOUCH
 from golem.robots.mujoco.engine import standing_height
 from golem.robots.mujoco.external_forces import Pushes

@@ -21,9 +21,9 @@ from golem.robots.sensors.streams import stream
 from golem.robots.worlds import furnished, parts, terrain
 from golem.robots.worlds.clutter import add_clutter
 from golem.robots.worlds.conditions import REACH_Y, Conditions, arranged, draw_conditions, draw_fasteners, world_stream
-from golem.robots.worlds.dressing import dress
 from golem.robots.worlds.fridge import Seal, seal_of
 from golem.robots.worlds.furnished import Person
+from golem.robots.worlds.hall import dress
 from golem.robots.worlds.ioniq5 import Ioniq5Layout
 from golem.robots.worlds.kitchen import KitchenLayout, add_kitchen, draw_counter, draw_kitchen, mirrored
 from golem.robots.worlds.layout import GANTRY, PackLayout

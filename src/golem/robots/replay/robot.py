@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from golem.errors import RobotGone
 from golem.interfaces import images, public
-from golem.interfaces.lens import Lens, to_lens
+from golem.interfaces.images import Lens, to_lens
 from golem.middleware.bags.base import BagError, BagMessage
 from golem.middleware.bags.reader import Bag
 from golem.middleware.ros import codec

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +14,37 @@ import numpy as np
 from golem.errors import ConfigError, OutputError
 from golem.interfaces import public
 from golem.interfaces import ros_convert as convert
+from golem.interfaces.lidar import LidarImu, LidarScan
 from golem.middleware.ros.msgs.tf2_msgs import TFMessage
 from golem.robots.model.spatial import skew
 from golem.robots.model.table import JOINT_INDEX, JOINT_NAMES
 from golem.types import NUM_JOINTS, SIDES, Array
+
+
+class LidarCorrection:
+    """Corrects scans and IMU samples by a calibrated mount.
+
+    Everything behind it may take the sensor for where the model has it. The place of the IMU in the sensor is left
+    alone: a mount that is off by millimetres moves it by no more.
+    """
+
+    def __init__(self, pose: Array | None) -> None:
+        """Correct by the (4, 4) pose of lidar_link in the nominal one; None corrects nothing."""
+        self._R = None if pose is None else pose[:3, :3].astype(np.float32)
+        self._p = None if pose is None else pose[:3, 3].astype(np.float32)
+
+    def scan(self, scan: LidarScan) -> LidarScan:
+        """Return `scan` with its points in the nominal lidar_link."""
+        if self._R is None or self._p is None:
+            return scan
+        return replace(scan, points=scan.points @ self._R.T + self._p)
+
+    def imu(self, sample: LidarImu) -> LidarImu:
+        """Return `sample` in the axes of the nominal lidar_link."""
+        if self._R is None:
+            return sample
+        return replace(sample, gyro=self._R @ sample.gyro, acc=self._R @ sample.acc)
+
 
 OPTICAL_FRAMES = {"head": "head_camera_optical"} | {f"{s}_hand": f"{s}_hand_camera_optical" for s in SIDES}
 """Frame of the nominal model per camera."""

@@ -14,7 +14,7 @@ import numpy as np
 from golem import __version__
 from golem.errors import ConfigError, unknown_name
 from golem.output_file import write_file
-from golem.robots.model.kinematics import Kinematics
+from golem.robots.model.pinocchio_model import Kinematics
 from golem.robots.model.spatial import skew
 from golem.robots.model.table import JOINT_NAMES, JOINTS
 from golem.runtime.bringup.base import (

@@ -11,8 +11,7 @@ from dataclasses import replace
 
 from golem.interfaces import topics
 from golem.middleware.bus import Bus, News
-from golem.middleware.wire.api import ApiRequest, Response
-from golem.middleware.wire.rpc import RpcClient, RpcServer
+from golem.middleware.wire.api import ApiRequest, Response, RpcClient, RpcServer
 from golem.types import TICK
 
 WAITING = 64

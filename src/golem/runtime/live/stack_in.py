@@ -10,7 +10,7 @@ from typing import Generic, TypeVar
 
 from golem.interfaces import images, public, topics
 from golem.interfaces import ros_convert as convert
-from golem.interfaces.lens import Lens, to_lens
+from golem.interfaces.images import Lens, to_lens
 from golem.interfaces.payloads import Exposure, GateState, GateStatus
 from golem.middleware.bus import Bus, Topic
 from golem.middleware.ros.future import Future

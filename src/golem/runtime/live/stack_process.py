@@ -23,8 +23,7 @@ from golem.middleware.ros.msgs.std_srvs import Trigger_Response
 from golem.middleware.ros.node import RosNode
 from golem.middleware.ros.waitset import WaitSet
 from golem.middleware.wire import convert
-from golem.middleware.wire.api import request_topic, response_topic
-from golem.middleware.wire.rpc import RpcClient
+from golem.middleware.wire.api import RpcClient, request_topic, response_topic
 from golem.middleware.wire.struct_layout import WireError
 from golem.robots.sensors.calibration import calibrations
 from golem.runtime.executor import Executor, Phase, Placed, in_order

@@ -14,9 +14,8 @@ from golem.middleware.dds.base import Participant, Sample
 from golem.middleware.ros.msgs.std_srvs import Trigger_Response
 from golem.middleware.ros.node import RosNode
 from golem.middleware.ros.waitset import WaitSet
-from golem.middleware.wire.api import request_topic, response_topic
+from golem.middleware.wire.api import RpcServer, request_topic, response_topic
 from golem.middleware.wire.convert import answered, decode_low_command
-from golem.middleware.wire.rpc import RpcServer
 from golem.middleware.wire.struct_layout import WireError
 from golem.robots.base import HasGantry, Robot
 from golem.robots.unitree import motion_switcher

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from golem.capabilities.arms.postures import POSTURES
-from golem.robots.model.limits import load_limits
+from golem.robots.model.table import load_limits
 from golem.types import UPPER, Array
 
 NUM_UPPER = UPPER.stop - UPPER.start

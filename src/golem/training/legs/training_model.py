@@ -17,8 +17,7 @@ from golem.hardware.safety.base import SafetyLimits
 from golem.hardware.servo.gains import default_gains
 from golem.robots.model import magpie_model, mjcf
 from golem.robots.model.leg_kinematics import SOLE_CENTER, leg_poses, sole_centers
-from golem.robots.model.limits import load_limits
-from golem.robots.model.table import BASE_LINK, SOLE
+from golem.robots.model.table import BASE_LINK, SOLE, load_limits
 from golem.types import LEGS, NUM_JOINTS, SIDES, Array
 
 STEP = 0.01

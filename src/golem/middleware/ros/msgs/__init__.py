@@ -12,7 +12,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from golem.middleware.ros.message_class import Definition, message_class, short
+from golem.middleware.ros.message import Definition, message_class, short
 
 DEFINITIONS: dict[str, Definition] = json.loads((Path(__file__).parent / "definitions.json").read_text("utf-8"))
 """Constants and fields of every type held here, as of ROS 2 Jazzy."""
