@@ -183,9 +183,9 @@ def page() -> str:
         "| stop2 | legs stand by a controller of the gate, arms damp; `stop` damps all, `reset`, `activate` go on |",
         "| stop1 | damping, for 3 s |",
         "| stop0 | limp |\n",
-        "A stop whose reason leaves state and legs sound leads to stop2 (`golem safety --stand`,",
-        "which `golem launch` gives where a robot stands), if a foot carried it within the last",
-        "0.3 s, by the gate's own estimate. Every other leads to stop1. Of several at once the strictest counts.",
+        "A stop whose reason leaves state and legs sound leads to stop2, if a foot carried the robot within the last",
+        "0.3 s, by the gate's own estimate. Stop2 needs `golem safety --stand`, which `golem launch` gives where a",
+        "robot stands. Every other reason leads to stop1. Of several at once the strictest counts.",
         "Of reasons marked *arms* that holds where the legs have no part in it.\n",
         f"A reset waits until {_L.reset_after:g} s after the stop, for a torso that turns at less than "
         f"{_L.at_rest[0]:g} rad/s and",

@@ -15,8 +15,8 @@ INTRODUCTION = """# Tried against ROS 2
 Written by `python -m tests.interop.table docs/reference/interop.md`, which runs every row of
 [Interfaces](topics.md) against rclpy, in both directions: ROS 2 {distros}, over Fast DDS and over Cyclone DDS.
 
-A topic is published by one side with the row's QoS and read by the other; a service is called, an action is given a
-goal and sends feedback and a result. All fields hold random values, and what arrives has to be equal to what was sent.
+A topic is published by one side with the row's QoS and read by the other. A service is called. An action is given a
+goal, and sends feedback and a result. All fields hold random values, and what arrives has to be equal to what was sent.
 Of what we publish, the QoS and the hash of the type that ROS sees have to be right, too.
 In each cell the first word is for what ROS gets of us, the second for what we get of ROS.
 
