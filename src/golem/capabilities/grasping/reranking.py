@@ -29,7 +29,7 @@ from golem.types import Array, LocalizedObject, Side
 SCENE = 30000
 """Points of the scene that make the world, evenly taken."""
 COMFORT = (0.25, 0.12)
-"""Distance from a stop [rad] and manipulability of a well-placed arm; more is no better. As in `arms.solve`."""
+"""Distance from a stop [rad] and manipulability of a well-placed arm; more is no better: what such an arm reaches."""
 
 
 @dataclass(frozen=True, slots=True)
