@@ -8,8 +8,8 @@ import pytest
 from golem.capabilities.arms.postures import POSTURES
 from golem.errors import ModuleFault
 from golem.robots.model.table import JOINT_NAMES, load_limits
-from golem.runtime.arm_limits import BEGINNING, ROUNDING, ArmLimits
 from golem.runtime.contract_check import ContractCheck
+from golem.runtime.nodes import BEGINNING, ROUNDING, ArmLimits
 from golem.types import NUM_JOINTS, UPPER, Array
 
 LIMITS = load_limits()

@@ -19,7 +19,7 @@ from golem.interfaces.payloads import Detections, Odometry
 from golem.middleware.bus import Bus
 from golem.runtime.checked import CheckedMemory
 from golem.runtime.contract_check import ContractCheck
-from golem.runtime.memory_node import MemoryNode
+from golem.runtime.perception_nodes import MemoryNode
 from golem.types import PlanarPose
 
 

@@ -15,7 +15,7 @@ from golem.capabilities.legs.base import Envelope
 from golem.capabilities.legs.hold import STANCES
 from golem.capabilities.perception.base import Localizer
 from golem.errors import ConfigError, ModuleFault, RobotGone
-from golem.hardware.estop.virtual import VirtualEstop
+from golem.hardware.estop.estop_config import VirtualEstop
 from golem.hardware.safety.base import OperatorRequest, SafetyLimits
 from golem.interfaces.payloads import GateStatus
 from golem.middleware.bus import Bus

@@ -31,10 +31,10 @@ from golem.runtime.checked import CheckedGraspMethod, CheckedMemory, CheckedNavi
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.executor import Phase, Placed
 from golem.runtime.lower_body_node import CheckedLowerBody, LowerBodyNode
-from golem.runtime.memory_node import MemoryNode
 from golem.runtime.navigator_node import BusNav2, NavigatorNode
 from golem.runtime.odometry_node import LidarNode, MapperNode, OdometryNode, ScanNode
 from golem.runtime.onboard_nodes import BusOnboard, LocoServiceNode, ServiceNode, stack_loco_api
+from golem.runtime.perception_nodes import MemoryNode
 from golem.runtime.skill_table import SkillTable
 from golem.runtime.standing_legs import GantryReleaseNode
 from golem.skills.base import Routine

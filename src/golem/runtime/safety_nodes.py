@@ -9,7 +9,7 @@ from contextvars import ContextVar
 from dataclasses import dataclass, field
 
 from golem.hardware.estop.base import EmergencyStop
-from golem.hardware.estop.virtual import VirtualEstop
+from golem.hardware.estop.estop_config import VirtualEstop
 from golem.hardware.safety.base import GateInputs, OperatorRequest, SafetyLimits
 from golem.hardware.safety.gate import Gate
 from golem.hardware.safety.gate_stage import GateStage

@@ -6,11 +6,11 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+from golem.capabilities.navigation.base import NavInputs
 from golem.capabilities.navigation.edge_fit import NearEdge
-from golem.capabilities.navigation.goto import GoTo
+from golem.capabilities.navigation.goto import GoTo, GoToConfig
 from golem.errors import ConfigError
 from golem.options import require
-from golem.skills.approach import APPROACH, TIMEOUT, approach
 from golem.skills.base import SkillResult, StageFailed
 from golem.skills.context import Context
 from golem.skills.pack_view import CAMERA, LOOK, see_edge, see_fasteners
@@ -18,6 +18,38 @@ from golem.skills.pose_goal import FIRST_REPORT, MARGIN
 from golem.skills.poses import floor_places
 from golem.skills.stance_choice import GOOD, PackStance, best_stance, stance_here
 from golem.types import Array, PlanarPose, Twist
+
+TIMEOUT = 30.0
+"""Time that one approach may take [s]."""
+APPROACH = GoToConfig(speed=(0.2, 0.15, 0.3), face=5.0)
+"""Slow, and always facing as it will stand."""
+
+
+async def approach(context: Context, navigator: GoTo, target: PlanarPose) -> None:
+    """Go straight to a pose in the odometry's frame, and stand, there or after `TIMEOUT`.
+
+    Args:
+        context: of the skill.
+        navigator: learns with every approach how these legs stop.
+        target: where base_link shall be.
+
+    Raises:
+        StageFailed: the odometry has fallen silent; the robot stands.
+    """
+    navigator.start(target)
+    end = context.t + TIMEOUT
+    try:
+        while context.t < end:
+            await context.tick()
+            status = context.legs.status
+            pose = PlanarPose.of(context.legs.pose) @ status.rest
+            step = navigator.step(NavInputs(pose, status.moving), context.period)
+            context.legs.drive(step.twist)
+            if step.arrived:
+                return
+    finally:
+        context.legs.drive(Twist())
+
 
 SETTLE = 1.0
 """Time that the body gets to come to rest before it looks [s]."""

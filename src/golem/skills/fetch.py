@@ -15,9 +15,9 @@ from golem.capabilities.navigation.goto import GoTo
 from golem.capabilities.planning.base import PlanRefused
 from golem.errors import ConfigError
 from golem.options import require
-from golem.skills.approach import APPROACH, approach
 from golem.skills.base import SkillResult, StageFailed
 from golem.skills.context import Context
+from golem.skills.dock import APPROACH, approach
 from golem.skills.force_guard import PATIENCE, KeptGrip
 from golem.skills.navigate import NavigateGoal
 from golem.skills.pack_view import see_edge

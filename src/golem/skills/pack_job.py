@@ -12,11 +12,10 @@ import numpy as np
 from golem.capabilities.navigation.goto import GoTo
 from golem.interfaces import topics
 from golem.middleware.bus import News
-from golem.skills.approach import APPROACH, approach
 from golem.skills.base import FAULT, REFUSED, SkillResult, StageFailed
 from golem.skills.context import Context
 from golem.skills.disassemble_goal import DisassembleGoal, DisassembleReport
-from golem.skills.dock import DockGoal, DockReport
+from golem.skills.dock import APPROACH, DockGoal, DockReport, approach
 from golem.skills.fastener_list import KINDS
 from golem.skills.job_file import TO_DO, Fate, JobFile, PackFastener
 from golem.skills.navigate import NavigateGoal

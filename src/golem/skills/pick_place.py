@@ -9,10 +9,9 @@ import numpy as np
 from golem.capabilities.planning.base import PlanRefused, Refusal
 from golem.interfaces.payloads import GripState
 from golem.skills.base import StageFailed
-from golem.skills.container import Container, shift_of
 from golem.skills.context import Context
 from golem.skills.pick_config import PickConfig, PickFailed, PickOutcome, PickReport, Sight
-from golem.skills.pick_targets import Attempt, HandReach, PickChoice, positions
+from golem.skills.pick_targets import Attempt, Container, HandReach, PickChoice, positions, shift_of
 from golem.skills.poses import lifted, moved, turned
 from golem.skills.travel import Travel
 from golem.types import Array

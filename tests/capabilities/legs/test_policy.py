@@ -10,9 +10,9 @@ from tests.capabilities.legs.test_network import write_onnx
 from golem.capabilities.legs.almi import NETWORKS, STAND, WALK, Almi, AlmiConfig, Ground
 from golem.capabilities.legs.base import STANDING, LocomotionCommand, LowerBody
 from golem.capabilities.legs.description import SHIPPED
+from golem.capabilities.legs.gait import swing_offset
 from golem.capabilities.legs.locomotion import Locomotion
 from golem.capabilities.legs.policy import BadAction, Policy, PolicyConfig
-from golem.capabilities.legs.swing import swing_offset
 from golem.errors import ConfigError
 from golem.registry import configure
 from golem.types import NUM_JOINTS, UPPER, BaseEstimate, Imu, LowState, Twist

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from golem.capabilities.legs.swing import LIFT, rise, swing_offset, swing_share
+from golem.capabilities.legs.gait import LIFT, rise, swing_offset, swing_share
 
 STIFF = np.zeros(12)
 """Lag of joints that follow at once [s]."""

@@ -20,7 +20,7 @@ from golem.evaluation.report.ladder_report import render
 from golem.robots.mujoco.balance import TRACE, BalanceTrace
 
 pytest.importorskip("matplotlib", reason="the extra report is not installed")
-from golem.evaluation.report import html_page  # noqa: E402
+from golem.evaluation.report import svg_figure
 
 VOID = {"meta", "img", "br"}
 
@@ -154,4 +154,4 @@ def test_without_the_extra_the_run_ends_well_and_says_how_to_get_the_report(
     assert (result.out / "summary.json").exists()
     monkeypatch.setitem(sys.modules, "jinja2", None)
     with pytest.raises(MissingExtra, match="jinja2"):
-        html_page.render_page("demo.html", {})
+        svg_figure.render_page("demo.html", {})

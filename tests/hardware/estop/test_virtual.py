@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from golem.hardware.estop.base import EmergencyStop
-from golem.hardware.estop.virtual import VirtualEstop
+from golem.hardware.estop.estop_config import VirtualEstop
 from golem.interfaces.payloads import EstopMessage
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from golem.errors import ConfigError
-from golem.hardware.estop.virtual import VirtualEstop
+from golem.hardware.estop.estop_config import VirtualEstop
 from golem.hardware.safety.base import GateInputs, OperatorRequest, SafetyLimits
 from golem.hardware.safety.gate import Gate
 from golem.hardware.servo.base import MotorServo

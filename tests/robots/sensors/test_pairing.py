@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from golem.interfaces import images
+from golem.interfaces.images import Pairing
 from golem.middleware.ros.msgs.sensor_msgs import Image
-from golem.robots.sensors.pairing import Pairing
 
 
 def color(t: float) -> Image:

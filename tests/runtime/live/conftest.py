@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from golem.hardware.estop.base import EmergencyStop
-from golem.hardware.estop.virtual import VirtualEstop
+from golem.hardware.estop.estop_config import VirtualEstop
 from golem.hardware.safety.base import SafetyLimits
 from golem.interfaces.payloads import GateState
 from golem.middleware.dds.local import LocalDomain, LocalParticipant

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from tests.runtime.live.conftest import Live
 
-from golem.hardware.estop.virtual import VirtualEstop
+from golem.hardware.estop.estop_config import VirtualEstop
 from golem.hardware.safety.base import SafetyLimits
 from golem.interfaces import public
 from golem.interfaces.payloads import GateState

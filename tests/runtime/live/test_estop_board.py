@@ -8,7 +8,7 @@ import pytest
 from tests.runtime.live.conftest import Live
 
 from golem.errors import ConfigError
-from golem.hardware.estop.virtual import VirtualEstop
+from golem.hardware.estop.estop_config import VirtualEstop
 from golem.interfaces.payloads import EstopMessage, GateState
 from golem.middleware.dds.domain import DdsConfig
 from golem.runtime.live.launch import LaunchConfig, commands

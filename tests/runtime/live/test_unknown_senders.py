@@ -7,7 +7,7 @@ import time
 import pytest
 from tests.runtime.live.conftest import Live
 
-from golem.hardware.estop.virtual import VirtualEstop
+from golem.hardware.estop.estop_config import VirtualEstop
 from golem.hardware.safety.base import SafetyLimits
 from golem.interfaces.payloads import GateState
 from golem.runtime.live.safety_main import commands

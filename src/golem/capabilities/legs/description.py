@@ -32,7 +32,7 @@ class ActionScaling:
     Attributes:
         scale: factor of the actions [rad]; one number, six (both legs alike) or twelve.
         clip: actions are limited to +- this before scaling.
-        swing: amplitude of the stepping motion underneath (see `swing.swing_offset`) [rad]; 0 leaves it out.
+        swing: amplitude of the stepping motion underneath (see `gait.swing_offset`) [rad]; 0 leaves it out.
         targets: lowest and highest target of each leg motor [rad]; empty limits none.
     """
 

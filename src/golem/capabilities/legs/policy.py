@@ -8,10 +8,10 @@ import numpy as np
 
 from golem.capabilities.legs.base import LocomotionCommand
 from golem.capabilities.legs.description import JOINTS, Description
+from golem.capabilities.legs.gait import swing_legs
 from golem.capabilities.legs.network import Network, load_network
 from golem.capabilities.legs.passports.onnx_metadata import said_joints
 from golem.capabilities.legs.passports.read import read_passport
-from golem.capabilities.legs.swing import swing_legs
 from golem.errors import ConfigError, GolemError
 from golem.interfaces.payloads import LegCommand
 from golem.kernels import njit

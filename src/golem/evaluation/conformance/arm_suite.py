@@ -16,9 +16,8 @@ from golem.evaluation.conformance.suite import Suite
 from golem.interfaces.payloads import ArmCommand
 from golem.robots.model.pinocchio_model import Kinematics
 from golem.robots.model.table import load_limits
-from golem.runtime.arm_limits import ArmLimits
 from golem.runtime.contract_check import ContractCheck
-from golem.runtime.nodes import MIN_RATE
+from golem.runtime.nodes import MIN_RATE, ArmLimits
 from golem.types import UPPER, Array
 
 TICKS = 60

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from golem.evaluation.faults.injection import FaultMoment, Injection, edited_state
-from golem.hardware.estop.virtual import VirtualEstop
+from golem.hardware.estop.estop_config import VirtualEstop
 from golem.hardware.safety.base import SafetyLimits
 from golem.interfaces import public, topics
 from golem.interfaces.payloads import GateState, GateStatus

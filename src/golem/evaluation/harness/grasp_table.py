@@ -20,10 +20,9 @@ from golem.evaluation.metrics.statistics import wilson
 from golem.evaluation.metrics.summary import Summary, comparisons_of, row
 from golem.evaluation.metrics.tables import comparisons
 from golem.evaluation.metrics.text_table import TextTable
-from golem.evaluation.report.html_page import render_page
 from golem.evaluation.report.ladder_report import failure_plot
 from golem.evaluation.report.margin_plot import MarginBox, kept_traces, margin_box, margin_boxes
-from golem.evaluation.report.svg_figure import styled
+from golem.evaluation.report.svg_figure import render_page, styled
 from golem.options import fill
 from golem.output_file import write_file
 from golem.provenance import command_line

@@ -12,11 +12,28 @@ from golem.capabilities.legs.network import LOADERS, load_network, onnx_session
 from golem.capabilities.legs.passports.base import Passport
 from golem.capabilities.legs.passports.onnx_metadata import said_joints
 from golem.errors import ConfigError
-from golem.evaluation.passport.base import Mistake
 from golem.evaluation.passport.repairs import Repair, repairs
 from golem.evaluation.passport.trial import SOUND, Floor, Trial, walk
 from golem.robots.model.table import JOINT_NAMES, load_limits
 from golem.types import LEGS, Array
+
+
+@dataclass(frozen=True, slots=True)
+class Mistake:
+    """One thing that is wrong.
+
+    Attributes:
+        cause: what it is, one word or two: `order`, `sign`, `scale`, `offset`, `gains`, `rate`, `gyro frame`, `gravity
+            sign`, `quaternion order`, `history layout`, `history length`, `clock phase`, `clip`, `commands`, `names`,
+            `sizes`, or `unknown`.
+        said: what was seen, a sentence.
+        field: the field of the description that is to change; the place of a term, such as `0`; may be empty.
+    """
+
+    cause: str
+    said: str
+    field: str = ""
+
 
 STIFFNESS = (5.0, 2000.0)
 """Least and greatest stiffness of a leg motor that carries the robot [N m/rad] [own; public ones: 20 to 300]."""

@@ -11,9 +11,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from golem.evaluation.report.html_page import render_page
 from golem.evaluation.report.margin_plot import MarginCurve, margin_plot
-from golem.evaluation.report.svg_figure import styled
+from golem.evaluation.report.svg_figure import render_page, styled
 from golem.robots.mujoco.balance import BalanceTrace
 
 

@@ -19,7 +19,6 @@ from golem.evaluation.metrics.statistics import Interval, wilson
 from golem.evaluation.metrics.summary import NO_MODULE, MethodSummary, Summary, summarise
 from golem.evaluation.metrics.tables import all_cases, comparisons, metric_differences, metrics, rates
 from golem.evaluation.metrics.text_table import short_names
-from golem.evaluation.report.html_page import render_page
 from golem.evaluation.report.margin_plot import (
     MAX_CURVES,
     MarginBox,
@@ -29,7 +28,16 @@ from golem.evaluation.report.margin_plot import (
     margin_boxes,
     margin_plot,
 )
-from golem.evaluation.report.svg_figure import COLOUR, cause_colour, method_colour, page_figure, standalone, styled, svg
+from golem.evaluation.report.svg_figure import (
+    COLOUR,
+    cause_colour,
+    method_colour,
+    page_figure,
+    render_page,
+    standalone,
+    styled,
+    svg,
+)
 
 ROW = 34.0
 """Height of one row of a figure [px]."""

@@ -1,4 +1,4 @@
-"""Figures as inline SVG that takes its colours from the page's style sheet, so that they follow light and dark."""
+"""Pages by jinja2, and their figures as inline SVG in the colours of the page's style sheet, light or dark."""
 
 from __future__ import annotations
 
@@ -10,6 +10,23 @@ from typing import Any
 from golem.errors import MissingExtra
 from golem.figures import blank_figure
 from golem.package_data import load_data
+
+
+def render_page(template: str, facts: dict[str, str], **values: Any) -> str:
+    """Return the page that a template of `templates/` makes of `values`, with `facts` of its provenance at the end.
+
+    Raises:
+        MissingExtra: jinja2 is not installed.
+    """
+    try:
+        from jinja2 import Environment, PackageLoader, StrictUndefined
+    except ImportError as error:
+        raise MissingExtra("jinja2", "report") from error
+    css = resources.files("golem.evaluation.report").joinpath("report.css").read_text(encoding="utf-8")
+    loader = PackageLoader("golem.evaluation.report")
+    pages = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
+    return pages.get_template(template).render(css=css, facts=facts, **values)
+
 
 WIDTH = 900.0
 """Width of a figure over the whole page [px]; the page scales it."""

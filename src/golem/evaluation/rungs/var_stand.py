@@ -29,10 +29,10 @@ from golem.middleware.bus import News
 from golem.robots.mujoco.balance import TRACE, BalanceRecorder
 from golem.robots.worlds.conditions import LayoutKind
 from golem.runtime.lockstep import build_robot
-from golem.skills.approach import APPROACH, approach
 from golem.skills.base import SkillResult
 from golem.skills.context import Context
 from golem.skills.disassemble_goal import DisassembleGoal, DisassembleReport
+from golem.skills.dock import APPROACH, approach
 from golem.skills.navigate import NavigateGoal
 from golem.skills.pack_job import CONTENT, STAGE
 from golem.skills.pick_config import PickGoal, PickOutcome, PickReport

@@ -21,7 +21,7 @@ from golem.capabilities.arms.diff_ik import DiffIK
 from golem.capabilities.arms.postures import posture
 from golem.errors import ConfigError, GolemError, MissingExtra
 from golem.evaluation.speed.navigation_bench import navigation_times
-from golem.hardware.estop.virtual import VirtualEstop
+from golem.hardware.estop.estop_config import VirtualEstop
 from golem.hardware.safety.base import GateInputs, OperatorRequest, SafetyLimits
 from golem.hardware.safety.gate import Gate, check
 from golem.hardware.safety.memory import GateMemory

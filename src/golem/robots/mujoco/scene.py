@@ -19,7 +19,6 @@ from golem.robots.mujoco.config import IONIQ5, KITCHENS, PLANTS, WITH_PACK, WORK
 from golem.robots.sensors.profiles import RealismProfile
 from golem.robots.sensors.streams import stream
 from golem.robots.worlds import furnished, parts, terrain
-from golem.robots.worlds.clutter import add_clutter
 from golem.robots.worlds.conditions import REACH_Y, Conditions, arranged, draw_conditions, draw_fasteners, world_stream
 from golem.robots.worlds.fridge import Seal, seal_of
 from golem.robots.worlds.furnished import Person
@@ -28,6 +27,7 @@ from golem.robots.worlds.ioniq5 import Ioniq5Layout
 from golem.robots.worlds.kitchen import KitchenLayout, add_kitchen, draw_counter, draw_kitchen, mirrored
 from golem.robots.worlds.layout import GANTRY, PackLayout
 from golem.robots.worlds.pack import PackNames, add_pack
+from golem.robots.worlds.pack_part import add_clutter
 from golem.robots.worlds.screws import ScrewDraw, draw_screws
 from golem.true_runs import true_runs
 from golem.types import SIDES, Array, CameraInfo, PlanarPose

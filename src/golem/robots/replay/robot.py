@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from golem.errors import RobotGone
 from golem.interfaces import images, public
-from golem.interfaces.images import Lens, to_lens
+from golem.interfaces.images import Lens, Pairing, to_lens
 from golem.middleware.bags.base import BagError, BagMessage
 from golem.middleware.bags.reader import Bag
 from golem.middleware.ros import codec
@@ -28,7 +28,6 @@ from golem.middleware.wire.struct_layout import WireError
 from golem.robots.base import STAMP_TOLERANCE
 from golem.robots.sensors.calibration import calibrations
 from golem.robots.sensors.cameras import CAMERAS
-from golem.robots.sensors.pairing import Pairing
 from golem.types import SIDES, Array, HandCommand, HandState, Imu, LowCommand, LowState, Side
 
 T = TypeVar("T")

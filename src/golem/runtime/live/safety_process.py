@@ -13,7 +13,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from golem.hardware.estop.base import EmergencyStop
-from golem.hardware.estop.virtual import VirtualEstop
+from golem.hardware.estop.estop_config import VirtualEstop
 from golem.hardware.safety.base import GateInputs, OperatorRequest, SafetyLimits
 from golem.hardware.safety.gate import Gate, passive
 from golem.hardware.safety.standing_gate import StandingController, StandingGate

@@ -10,7 +10,7 @@ from typing import Generic, TypeVar
 
 from golem.interfaces import images, public, topics
 from golem.interfaces import ros_convert as convert
-from golem.interfaces.images import Lens, to_lens
+from golem.interfaces.images import Lens, Pairing, to_lens
 from golem.interfaces.payloads import Exposure, GateState, GateStatus
 from golem.middleware.bus import Bus, Topic
 from golem.middleware.ros.future import Future
@@ -20,7 +20,6 @@ from golem.middleware.ros.node import RosNode
 from golem.middleware.ros.pubsub import Subscription
 from golem.middleware.ros.service import Client
 from golem.robots.sensors.cameras import CAMERAS
-from golem.robots.sensors.pairing import Pairing
 from golem.runtime.live.node_setup import log_line
 from golem.runtime.live.role_endpoints import RoleEndpoints
 from golem.runtime.live.sim_sync import SILENCE

@@ -9,11 +9,11 @@ from scipy.spatial.transform import Rotation
 
 from golem.robots.sensors.cameras import CAMERAS, T_MUJOCO_OPTICAL
 from golem.robots.worlds import hall
-from golem.robots.worlds.clutter import add_clutter
 from golem.robots.worlds.conditions import Conditions, draw_conditions
-from golem.robots.worlds.dressing import surfaces
+from golem.robots.worlds.hall import surfaces
 from golem.robots.worlds.layout import PackLayout
 from golem.robots.worlds.pack import PackNames, add_pack
+from golem.robots.worlds.pack_part import add_clutter
 from golem.robots.worlds.screws import ScrewDraw, ScrewRanges, draw_screws
 from golem.training.detector import random_scene
 from golem.training.detector.random_scene import Bore, Compiled, RandomScene

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from golem.capabilities.legs.balance_errors import heading_frame
 from golem.hardware.estimator.feet import Contact, ContactConfig
-from golem.hardware.estimator.random_walk import RandomWalk, RandomWalkConfig
+from golem.hardware.estimator.random_walk_kf import RandomWalk, RandomWalkConfig
 from golem.training.legs.batched_safety import LegGate
 from golem.training.legs.training_model import STANCE, STAND_HEIGHT, STEP, build_model
 from golem.types import GRAVITY, LEGS, NUM_JOINTS, Array

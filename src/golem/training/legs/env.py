@@ -17,9 +17,8 @@ from numpy.typing import NDArray
 
 from golem.capabilities.legs.balance_errors import balance_errors, heading_frame
 from golem.capabilities.legs.base import Envelope
-from golem.capabilities.legs.gait import Gait, GaitConfig
+from golem.capabilities.legs.gait import Gait, GaitConfig, swing_offset
 from golem.capabilities.legs.observation import ObservationLayout, Signals, Term
-from golem.capabilities.legs.swing import swing_offset
 from golem.hardware.safety.base import SafetyLimits
 from golem.robots.model.leg_kinematics import leg_poses, sole_centers
 from golem.training.legs.batch_world import BatchTruth, BatchWorld, Rows, WorldConfig

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from golem.capabilities.legs.gait import Gait, GaitConfig
-from golem.capabilities.legs.swing import rise, swing_share
+from golem.capabilities.legs.gait import Gait, GaitConfig, rise, swing_share
 from golem.hardware.safety.base import SafetyLimits
 from golem.training.legs.batch_world import BatchTruth, Rows
 from golem.training.legs.training_model import FEET_APART, STANCE, STAND_HEIGHT
