@@ -17,6 +17,7 @@ from rich.console import Console
 from rich.table import Table
 
 from golem.errors import LOCKS, GolemError, MissingSystemLibrary
+from golem.package_data import load_data
 from golem.robots.mujoco.gl import LIBRARIES
 
 DEBIAN_PACKAGES = ("libgomp1", *LIBRARIES["egl"][1].split())
@@ -31,22 +32,7 @@ BUFFER_NEEDED = 4 * 2**20
 PROBE_TIMEOUT = 120.0
 """How long a loaded machine may take to import everything once [s]."""
 
-EXTRAS = {
-    "pink": ("pink", "qpsolvers"),
-    "dds": ("cyclonedds", "rosbags"),
-    "record": ("mcap", "rosbags"),
-    "foxglove": ("foxglove", "rosbags"),
-    "report": ("matplotlib", "jinja2"),
-    "hardware": ("serial",),
-    "realsense": ("pyrealsense2",),
-    "cluster": ("distributed",),
-    "view": ("viser",),
-    "train": ("torch", "onnx"),
-    "vision": ("torch", "transformers"),
-    "lidar": ("kiss_icp", "rko_lio"),
-    "docs": ("mkdocs",),
-    "dev": ("pytest",),
-}
+EXTRAS: dict[str, list[str]] = load_data(__package__, "extras.yaml")
 """The importable modules of each optional extra."""
 _CHECKOUT = (Path(__file__).parents[2] / "scripts" / "bootstrap.sh").is_file()
 

@@ -1,4 +1,4 @@
-"""Which emergency stop a robot has, and the one that is a button on the screen."""
+"""Which emergency stop a robot has; one is made of software, for the twin, and is pressed like the board."""
 
 from __future__ import annotations
 

@@ -18,11 +18,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from mujoco import mjtGeom
 
+from golem.package_data import load_data
 from golem.robots.model import magpie_model
 from golem.robots.model.table import SOLE
 from golem.types import SIDES, Array, Side
@@ -73,7 +74,9 @@ class Shape:
 
 
 _SPHERE, _CAPSULE = mjtGeom.mjGEOM_SPHERE, mjtGeom.mjGEOM_CAPSULE
-_CYLINDER, _BOX = mjtGeom.mjGEOM_CYLINDER, mjtGeom.mjGEOM_BOX
+_BOX = mjtGeom.mjGEOM_BOX
+_KINDS = {"capsule": _CAPSULE, "cylinder": mjtGeom.mjGEOM_CYLINDER, "box": _BOX}
+_DATA: dict[str, Any] = load_data(__package__, "contact_shapes.yaml")
 
 
 def _shape(
@@ -90,31 +93,19 @@ def _shape(
     return Shape(link, kind, padded, np.array(pos, dtype=float), axis, friction, name)
 
 
+def _of_row(row: dict[str, Any], side: Side | None = None) -> Shape:
+    """Return the shape in a row of `contact_shapes.yaml`, of one side where it is given for the left one."""
+    x, y, z = row["pos"]
+    prefix, pos = (f"{side}_", (x, -y if side == "right" and y else y, z)) if side else ("", (x, y, z))
+    name = f"{prefix}{row['name']}" if "name" in row else ""
+    return _shape(prefix + row["link"], _KINDS[row["kind"]], row["size"], pos, row.get("axis", "z"), name=name)
+
+
 def body_shapes(feet: Feet = "spheres") -> list[Shape]:
     """Return the shapes of the 28 body links."""
-    shapes = [
-        _shape("pelvis", _CAPSULE, [0.055, 0.095], [0, 0, -0.035], "y", name="pelvis"),
-        _shape("torso_link", _BOX, [0.073, 0.105, 0.235], [0, 0, 0.245], name="trunk"),
-        _shape("torso_link", _CAPSULE, [0.085, 0.05], [0.02, 0, 0.64], name="head"),
-    ]
+    shapes = [_of_row(row) for row in _DATA["body"]]
     for side in SIDES:
-        s = 1.0 if side == "left" else -1.0
-        shapes += [
-            _shape(f"{side}_hip_yaw_link", _CAPSULE, [0.062, 0.02], [0, 0, 0], "y"),
-            _shape(f"{side}_hip_pitch_link", _CAPSULE, [0.06, 0.01], [0, 0, 0], "y"),
-            _shape(f"{side}_hip_roll_link", _CAPSULE, [0.062, 0.15], [0.003, 0, -0.2], name=f"{side}_thigh"),
-            _shape(f"{side}_knee_link", _CAPSULE, [0.046, 0.15], [0, 0, -0.18], name=f"{side}_shin"),
-            _shape(f"{side}_shoulder_pitch_link", _CAPSULE, [0.04, 0.03], [0, s * 0.055, -0.006], "y"),
-            _shape(f"{side}_shoulder_roll_link", _CAPSULE, [0.045, 0.05], [-0.034, 0, -0.05]),
-            _shape(f"{side}_shoulder_yaw_link", _CAPSULE, [0.04, 0.08], [0.003, 0, -0.1], name=f"{side}_upper_arm"),
-            _shape(
-                f"{side}_elbow_link", _CAPSULE, [0.042, 0.055], [0.03, s * -0.03, -0.003], "x", name=f"{side}_forearm"
-            ),
-            _shape(f"{side}_wrist_roll_link", _CAPSULE, [0.035, 0.02], [0.05, 0, 0], "x", name=f"{side}_wrist"),
-            _shape(f"{side}_wrist_yaw_link", _CYLINDER, [0.042, 0.028], [0.026, 0, 0], "x"),
-            # The adapter disc between wrist and hand (correlllab/h1_mujoco).
-            _shape(f"{side}_wrist_yaw_link", _CYLINDER, [0.032, 0.0125], [0.0665, 0, 0], "x"),
-        ]
+        shapes += [_of_row(row, side) for row in _DATA["left"]]
         if feet == "box":
             shapes.append(foot_box(side))
             continue
@@ -140,30 +131,16 @@ def hand_box(side: Side) -> Shape:
     return _shape(link, _BOX, [0.019, 0.0667, 0.0975], [-0.002, 0, 0.0995], name=f"{side}_hand_box")
 
 
-_ARM = ("upper_arm", "forearm", "wrist", "hand_box")
-_ARM_MEETS: dict[str, tuple[str, ...]] = {
-    "upper_arm": ("trunk",),
-    "forearm": ("trunk", "head", "pelvis", "left_thigh", "right_thigh"),
-    "wrist": ("trunk", "head", "pelvis"),
-    "hand_box": ("trunk", "head", "pelvis", "left_thigh", "right_thigh", "left_shin", "right_shin"),
-}
-"""What each part of an arm can reach of the rest of the body."""
-_LEGS_MEET = (
-    ("thigh", "thigh"), ("thigh", "shin"), ("shin", "thigh"), ("shin", "shin"),
-    ("shin", "foot"), ("foot", "shin"), ("foot", "foot"),
-)  # fmt: skip
-"""What of the left leg can reach what of the right one."""
-
-
 def self_pairs(hands: bool) -> list[tuple[str, str]]:
     """Return the names of the shapes that may meet: leg and leg, arm and arm, arm and the rest.
 
     Neighbours along a limb are left out, since their shapes overlap, and so is what the joints keep apart anyway. A
     robot without hands has no `hand_box`.
     """
-    pairs = [(f"left_{a}", f"right_{b}") for a, b in _LEGS_MEET]
-    arm = _ARM if hands else _ARM[:-1]
-    pairs += [(f"{side}_{part}", other) for side in SIDES for part in arm for other in _ARM_MEETS[part]]
+    pairs = [(f"left_{a}", f"right_{b}") for a, b in _DATA["legs_meet"]]
+    meets: dict[str, list[str]] = _DATA["arm_meets"]
+    arm = [part for part in meets if hands or part != "hand_box"]
+    pairs += [(f"{side}_{part}", other) for side in SIDES for part in arm for other in meets[part]]
     # An upper arm is out of the other upper arm's reach.
     pairs += [(f"left_{a}", f"right_{b}") for a, b in product(arm, arm) if (a, b) != ("upper_arm", "upper_arm")]
     return pairs
