@@ -43,7 +43,7 @@ def test_a_failing_row_makes_the_table_fail(monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_an_absent_extra_is_no_failure(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(doctor, "EXTRAS", {"pink": ("no_such_module",)})
+    monkeypatch.setattr(doctor, "EXTRAS", {"pink": ["no_such_module"]})
     (row,) = doctor.check_extras()
     assert row.fix and not row.failed
 

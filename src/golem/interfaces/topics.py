@@ -4,38 +4,9 @@ from __future__ import annotations
 
 from functools import cache
 
+from golem.interfaces import nav_payloads, payloads
 from golem.interfaces.lidar import ExternalOdometry, LidarImu, LidarScan
 from golem.interfaces.memory_payloads import MemoryStatus, RememberedPlaces
-from golem.interfaces.nav_payloads import (
-    MapFile,
-    MapPlace,
-    Nav2Goal,
-    Nav2Reply,
-    Nav2Twist,
-    NavGoal,
-    NavPath,
-    NavStep,
-    OccupancyGrid,
-    Scan,
-)
-from golem.interfaces.payloads import (
-    ArmCommand,
-    DetectionRequest,
-    Detections,
-    EstopMessage,
-    Exposure,
-    Fault,
-    Feedback,
-    GateStatus,
-    HandGoal,
-    HandStatus,
-    JointTrajectory,
-    LegCommand,
-    LegStatus,
-    ModuleFaultMsg,
-    Odometry,
-    OdometrySilence,
-)
 from golem.middleware.bus import Topic
 from golem.middleware.wire.api import ApiRequest, Response, request_topic, response_topic
 from golem.types import BaseEstimate, HandCommand, HandState, LowCommand, LowState, PalmTargets, RgbdImage, Side, Twist
@@ -48,29 +19,29 @@ LOW_CMD = Topic("lowcmd", LowCommand)
 """At 500 Hz, from the safety gate to the robot; nobody else writes it."""
 BASE = Topic("base_estimate", BaseEstimate)
 """At 500 Hz, from the base estimator."""
-ESTOP = Topic("estop", EstopMessage)
+ESTOP = Topic("estop", payloads.EstopMessage)
 """At 100 Hz, from the emergency stop."""
-SAFETY = Topic("safety/status", GateStatus)
+SAFETY = Topic("safety/status", payloads.GateStatus)
 """Whenever the safety gate ran."""
-TRANSPORT_FAULT = Topic("safety/transport", Fault)
+TRANSPORT_FAULT = Topic("safety/transport", payloads.Fault)
 """What the gate shall stop for: something is wrong with the way its frames come."""
 PALM_TARGETS = Topic("palm_targets", PalmTargets)
 """In odom, from the running skill."""
-ARM_TRAJECTORY = Topic("arm_trajectory", JointTrajectory)
+ARM_TRAJECTORY = Topic("arm_trajectory", payloads.JointTrajectory)
 """From the running skill; it holds until palm targets, or another one, come."""
-ARM_COMMAND = Topic("arm_command", ArmCommand)
+ARM_COMMAND = Topic("arm_command", payloads.ArmCommand)
 """From the upper-body controller."""
-LEG_COMMAND = Topic("leg_command", LegCommand)
+LEG_COMMAND = Topic("leg_command", payloads.LegCommand)
 """From the lower-body controller."""
 TWIST = Topic("cmd_vel", Twist)
 """For the lower body."""
-MODULE_FAULT = Topic("module_fault", ModuleFaultMsg)
+MODULE_FAULT = Topic("module_fault", payloads.ModuleFaultMsg)
 """Of a module without which the robot can still stand."""
-LEG_STATUS = Topic("legs/status", LegStatus)
+LEG_STATUS = Topic("legs/status", payloads.LegStatus)
 """From the base layer of the lower body."""
-ODOMETRY = Topic("odometry", Odometry)
+ODOMETRY = Topic("odometry", payloads.Odometry)
 """From whatever locates the robot better than its base estimate; a stack without it never sends any."""
-ODOMETRY_SILENCE = Topic("odometry/silence", OdometrySilence)
+ODOMETRY_SILENCE = Topic("odometry/silence", payloads.OdometrySilence)
 """From the same, whenever it has another reason to be silent, or none any more."""
 LIDAR_SCAN = Topic("lidar/scan", LidarScan)
 """At 10 Hz, from the LiDAR while somebody listens; a robot without one never sends any."""
@@ -78,37 +49,37 @@ LIDAR_IMU = Topic("lidar/imu", LidarImu)
 """At 200 Hz, from the IMU inside it."""
 EXTERNAL_ODOMETRY = Topic("odometry/external", ExternalOdometry)
 """From an odometry outside of this stack."""
-MAP = Topic("map", OccupancyGrid)
+MAP = Topic("map", nav_payloads.OccupancyGrid)
 """From whatever maps; a stack without it never sends any."""
-MAP_POSE = Topic("map/pose", MapPlace)
+MAP_POSE = Topic("map/pose", nav_payloads.MapPlace)
 """From whatever maps, with every scan, while the place in the map is known."""
-MAP_SAVE = Topic("map/save", MapFile)
+MAP_SAVE = Topic("map/save", nav_payloads.MapFile)
 """From a skill that wants the map to be kept."""
-MAP_SAVED = Topic("map/saved", MapFile)
+MAP_SAVED = Topic("map/saved", nav_payloads.MapFile)
 """The answer, from whatever maps."""
 MEMORY_STATUS = Topic("memory/status", MemoryStatus)
 """From the memory, when it begins and after each look that it was given."""
 MEMORY_PLACES = Topic("memory/places", RememberedPlaces)
 """After each look that it took, what a memory shows to people."""
-SCAN = Topic("scan", Scan)
+SCAN = Topic("scan", nav_payloads.Scan)
 """From a LiDAR that an odometry locates; a robot without one never sends any."""
-NAV_GOAL = Topic("navigation/goal", NavGoal)
+NAV_GOAL = Topic("navigation/goal", nav_payloads.NavGoal)
 """From the running skill, whenever it changes."""
-NAV_STEP = Topic("navigation/step", NavStep)
+NAV_STEP = Topic("navigation/step", nav_payloads.NavStep)
 """From the navigator while it has a goal."""
-NAV_PATH = Topic("navigation/path", NavPath)
+NAV_PATH = Topic("navigation/path", nav_payloads.NavPath)
 """From the navigator whenever it has found another way."""
-NAV2_GOAL = Topic("nav2/goal", Nav2Goal)
+NAV2_GOAL = Topic("nav2/goal", nav_payloads.Nav2Goal)
 """From a navigator that leaves the way to Nav2."""
-NAV2_REPLY = Topic("nav2/reply", Nav2Reply)
+NAV2_REPLY = Topic("nav2/reply", nav_payloads.Nav2Reply)
 """From whoever speaks to Nav2, at every change."""
-NAV2_TWIST = Topic("nav2/cmd_vel", Nav2Twist)
+NAV2_TWIST = Topic("nav2/cmd_vel", nav_payloads.Nav2Twist)
 """From Nav2's controller."""
 REMOVALS = Topic("removals", str)
 """From a gantry that loosens fasteners: a sentence before each."""
-FEEDBACK = Topic("skill/feedback", Feedback)
+FEEDBACK = Topic("skill/feedback", payloads.Feedback)
 """Of the running skill."""
-ONBOARD_LEGS = Topic("onboard/legs", LegCommand)
+ONBOARD_LEGS = Topic("onboard/legs", payloads.LegCommand)
 """From the on-board leg controller."""
 
 
@@ -125,15 +96,15 @@ def hand_command(side: Side) -> Topic[HandCommand]:
 
 
 @cache
-def hand_goal(side: Side) -> Topic[HandGoal]:
+def hand_goal(side: Side) -> Topic[payloads.HandGoal]:
     """Return the stream on which a skill tells one hand what to do."""
-    return Topic(f"{side}/gripper/goal", HandGoal)
+    return Topic(f"{side}/gripper/goal", payloads.HandGoal)
 
 
 @cache
-def hand_status(side: Side) -> Topic[HandStatus]:
+def hand_status(side: Side) -> Topic[payloads.HandStatus]:
     """Return the stream of what a hand's controller found."""
-    return Topic(f"{side}/gripper/status", HandStatus)
+    return Topic(f"{side}/gripper/status", payloads.HandStatus)
 
 
 @cache
@@ -149,9 +120,9 @@ def api_response(service: str) -> Topic[Response]:
 
 
 @cache
-def exposures(camera: str) -> Topic[Exposure]:
+def exposures(camera: str) -> Topic[payloads.Exposure]:
     """Return the stream of what one camera saw."""
-    return Topic(f"exposures/{camera}", Exposure)
+    return Topic(f"exposures/{camera}", payloads.Exposure)
 
 
 @cache
@@ -161,12 +132,12 @@ def rgbd_images(camera: str) -> Topic[RgbdImage]:
 
 
 @cache
-def detection_request(camera: str) -> Topic[DetectionRequest]:
+def detection_request(camera: str) -> Topic[payloads.DetectionRequest]:
     """Return the stream on which a skill asks for detections of one camera."""
-    return Topic(f"look/{camera}", DetectionRequest)
+    return Topic(f"look/{camera}", payloads.DetectionRequest)
 
 
 @cache
-def detections(camera: str) -> Topic[Detections]:
+def detections(camera: str) -> Topic[payloads.Detections]:
     """Return the stream of what was detected in the images of one camera."""
-    return Topic(f"objects/{camera}", Detections)
+    return Topic(f"objects/{camera}", payloads.Detections)

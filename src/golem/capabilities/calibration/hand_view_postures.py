@@ -8,18 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from golem.capabilities.arms.postures import posture
+from golem.capabilities.calibration import view_postures
 from golem.capabilities.calibration.hand_fit import OTHER, hand_information
-from golem.capabilities.calibration.view_postures import (
-    ARM,
-    BATCH,
-    CANDIDATES,
-    DRAWS,
-    SPREAD,
-    STEEPEST,
-    hand_poses,
-    hidden,
-    telling,
-)
 from golem.hardware.safety.base import SafetyLimits
 from golem.robots.model.magpie_model import T_HAND_CAMERA
 from golem.robots.model.pinocchio_model import Kinematics
@@ -57,14 +47,16 @@ def hand_view_postures(
     lower, upper = limits.lower[UPPER] + SPARE, limits.upper[UPPER] - SPARE
     T_base_torso = Kinematics().pose("torso_link")
     found: list[tuple[Array, list[int]]] = []
-    for _ in range(DRAWS // BATCH * len(SIDES)):
-        Q = np.zeros((BATCH, len(lower)))
+    for _ in range(view_postures.DRAWS // view_postures.BATCH * len(SIDES)):
+        Q = np.zeros((view_postures.BATCH, len(lower)))
         for side in SIDES:
-            part = ARM[side]
-            drawn = posture(f"ready_{side}")[part] + SPREAD * rng.uniform(-1.0, 1.0, (BATCH, 7))
+            part = view_postures.ARM[side]
+            drawn = posture(f"ready_{side}")[part] + view_postures.SPREAD * rng.uniform(
+                -1.0, 1.0, (view_postures.BATCH, 7)
+            )
             Q[:, part] = np.clip(drawn, lower[part], upper[part])
-        eyes = T_base_torso @ hand_poses(camera, Q[:, ARM[camera]]) @ T_HAND_CAMERA
-        hands = T_base_torso @ hand_poses(OTHER[camera], Q[:, ARM[OTHER[camera]]])
+        eyes = T_base_torso @ view_postures.hand_poses(camera, Q[:, view_postures.ARM[camera]]) @ T_HAND_CAMERA
+        hands = T_base_torso @ view_postures.hand_poses(OTHER[camera], Q[:, view_postures.ARM[OTHER[camera]]])
         seen = seen_tags(camera, eyes, hands)
         for i in np.flatnonzero(np.any(list(seen.values()), axis=0)):
             if not free(Q[i]):
@@ -73,17 +65,17 @@ def hand_view_postures(
             tags = [
                 n
                 for n, T in cuff_tags(OTHER[camera]).items()
-                if seen[n][i] and not hidden(eyes[i][:3, 3], (hands[i] @ T)[:3, 3], around)
+                if seen[n][i] and not view_postures.hidden(eyes[i][:3, 3], (hands[i] @ T)[:3, 3], around)
             ]
             if tags:
                 found.append((Q[i], tags))
-        if len(found) >= CANDIDATES:
+        if len(found) >= view_postures.CANDIDATES:
             break
     joints, told = np.zeros(NUM_JOINTS), list[Array]()
-    for q, tags in found[:CANDIDATES]:
+    for q, tags in found[: view_postures.CANDIDATES]:
         joints[UPPER] = q
         told.append(hand_information(camera, joints, tags, zero))
-    return [found[i][0] for i in telling(told, count)]
+    return [found[i][0] for i in view_postures.telling(told, count)]
 
 
 def seen_tags(camera: Side, eyes: Array, hands: Array) -> dict[int, NDArray[np.bool_]]:
@@ -103,5 +95,5 @@ def seen_tags(camera: Side, eyes: Array, hands: Array) -> dict[int, NDArray[np.b
         u, v = project(info, np.maximum(p, (-np.inf, -np.inf, 1e-3))).T
         good = (p[:, 2] > 0.0) & (distance >= RANGE[0]) & (distance <= RANGE[1])
         good &= (u >= MARGIN) & (u <= info.width - MARGIN) & (v >= MARGIN) & (v <= info.height - MARGIN)
-        out[number] = good & (np.einsum("ij,ij->i", tag[:, :3, 2], p) >= STEEPEST * distance)
+        out[number] = good & (np.einsum("ij,ij->i", tag[:, :3, 2], p) >= view_postures.STEEPEST * distance)
     return out

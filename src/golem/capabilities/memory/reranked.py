@@ -21,13 +21,7 @@ from golem.capabilities.memory.base import Evidence, Memory, Observation, Place,
 from golem.capabilities.memory.frame_index import FrameIndex, FrameIndexConfig, looked_at
 from golem.capabilities.memory.object_map import ObjectMap, ObjectMapConfig
 from golem.capabilities.memory.top_down_map import TopDownMap
-from golem.capabilities.perception.gemini_service import (
-    GeminiService,
-    GeminiServiceConfig,
-    image_part,
-    read_json,
-    to_jpeg,
-)
+from golem.capabilities.perception import gemini_service
 from golem.errors import ConfigError, unknown_name
 from golem.types import Array
 
@@ -36,7 +30,7 @@ SCORE = 0.9
 
 
 @dataclass(frozen=True)
-class PictureJudgeConfig(GeminiServiceConfig):
+class PictureJudgeConfig(gemini_service.GeminiServiceConfig):
     """Options of `PictureJudge`; see `GeminiServiceConfig`, and these.
 
     Attributes:
@@ -74,7 +68,7 @@ class PictureJudge:
             ConfigError: there is no key.
         """
         self._config, self._near = config, near
-        self._service = GeminiService(config, "Re-ranking by gemini", "choose the judge objects", sleep)
+        self._service = gemini_service.GeminiService(config, "Re-ranking by gemini", "choose the judge objects", sleep)
         self._pictures: deque[_Picture] = deque(maxlen=config.pictures)
         self.last = -math.inf
 
@@ -84,7 +78,7 @@ class PictureJudge:
         height, width = frame.rgb.shape[:2]
         size = self._config.width, max(1, round(height * self._config.width / width))
         small = cv2.resize(frame.rgb, size, interpolation=cv2.INTER_AREA)
-        jpeg = to_jpeg(np.asarray(small, np.uint8))
+        jpeg = gemini_service.to_jpeg(np.asarray(small, np.uint8))
         self._pictures.append(_Picture(frame.t, looked_at(observation), jpeg))
         self.last = frame.t
 
@@ -106,9 +100,9 @@ class PictureJudge:
         parts: list[Mapping[str, Any]] = []
         for k, (then, now) in enumerate(pairs):
             for name, picture in (("then", then), ("now", now)):
-                parts += [{"text": f"Place {k}, {name} ({picture.t:.0f} s):"}, image_part(picture.jpeg)]
+                parts += [{"text": f"Place {k}, {name} ({picture.t:.0f} s):"}, gemini_service.image_part(picture.jpeg)]
         parts.append({"text": _question(text)})
-        seen = _verdicts(read_json(self._service.ask(parts)), len(pairs))
+        seen = _verdicts(gemini_service.read_json(self._service.ask(parts)), len(pairs))
         places = [_place(text, when, then, now, *seen[k]) for k, (then, now) in enumerate(pairs) if k in seen]
         return _fitting([place for place in places if place is not None], when)[:limit]
 

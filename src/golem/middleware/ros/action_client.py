@@ -8,21 +8,8 @@ from collections.abc import Callable
 from typing import Any
 
 from golem.middleware.dds.base import DEFAULT, LATCHED, Sample
-from golem.middleware.ros import codec, names
+from golem.middleware.ros import codec, goals, names
 from golem.middleware.ros.future import Future, RosError
-from golem.middleware.ros.goals import (
-    CANCEL_GOAL,
-    NO_ID,
-    STATUS_ARRAY,
-    Canceling,
-    GoalStatus,
-    Outcome,
-    canceling,
-    from_uuid,
-    goal_info,
-    goal_status,
-    to_uuid,
-)
 from golem.middleware.ros.message import NANO, CodecError
 from golem.middleware.ros.msgs.action_msgs import CancelGoal_Request, GoalStatusArray
 from golem.middleware.ros.node_endpoints import NodeEndpoints
@@ -43,14 +30,14 @@ class ClientGoal:
     def __init__(self, client: ActionClient, id: bytes, on_feedback: Callable[[Any], None] | None) -> None:
         """Belong to `client`, which is about to send it."""
         self._client, self.id = client, id
-        self.accepted, self.status = False, GoalStatus.UNKNOWN
+        self.accepted, self.status = False, goals.GoalStatus.UNKNOWN
         self.on_feedback = on_feedback
 
-    def result(self) -> Future[Outcome]:
+    def result(self) -> Future[goals.Outcome]:
         """Ask for the outcome; the future brings it once the goal has ended."""
         return self._client.get_result(self)
 
-    def cancel(self) -> Future[Canceling]:
+    def cancel(self) -> Future[goals.Canceling]:
         """Ask the server to cancel the goal."""
         return self._client.cancel(self.id)
 
@@ -59,7 +46,7 @@ class ClientGoal:
         self.accepted = bool(response.accepted)
         return self
 
-    def learn(self, status: GoalStatus) -> None:
+    def learn(self, status: goals.GoalStatus) -> None:
         """Take in the status; what the status topic says late does not bring an ended goal back."""
         if not self.status.terminal:
             self.status = status
@@ -79,12 +66,12 @@ class ActionClient:
         self._goals: weakref.WeakValueDictionary[bytes, ClientGoal] = weakref.WeakValueDictionary()
         parts = names.action(name)
         self._goal = Client(endpoints, parts.send_goal, f"{type}_SendGoal")
-        self._cancel = Client(endpoints, parts.cancel_goal, CANCEL_GOAL)
+        self._cancel = Client(endpoints, parts.cancel_goal, goals.CANCEL_GOAL)
         self._result = Client(endpoints, parts.get_result, f"{type}_GetResult")
         self._feedback = endpoints.inbox(
             names.topic(parts.feedback), f"{type}_FeedbackMessage", DEFAULT, self._on_feedback
         )
-        self._status = endpoints.inbox(names.topic(parts.status), STATUS_ARRAY, LATCHED, self._on_status)
+        self._status = endpoints.inbox(names.topic(parts.status), goals.STATUS_ARRAY, LATCHED, self._on_status)
 
     def ready(self) -> bool:
         """Return whether a server with all its services and topics is there."""
@@ -107,32 +94,32 @@ class ActionClient:
         """
         check(f"Action '{self.name}'", goal, self._type.Goal)
         id = uuid.uuid4().bytes if id is None else id
-        if len(id) != 16 or id == NO_ID or id in self._goals:
+        if len(id) != 16 or id == goals.NO_ID or id in self._goals:
             raise RosError(f"A goal needs an id of its own, 16 bytes and not all zero; {id.hex()} cannot be it.")
         proposed = ClientGoal(self, id, feedback)
-        answer = self._goal.call(self._type.SendGoal.Request(to_uuid(id), goal))
+        answer = self._goal.call(self._type.SendGoal.Request(goals.to_uuid(id), goal))
         self._goals[id] = proposed
         return answer.map(proposed.answered)
 
-    def cancel(self, id: bytes = NO_ID, before: float = 0.0) -> Future[Canceling]:
+    def cancel(self, id: bytes = goals.NO_ID, before: float = 0.0) -> Future[goals.Canceling]:
         """Ask to cancel goals, of any client: all; or that with `id`; or those accepted at or before a time, and `id`.
 
         Args:
             id: 16 bytes of a goal, or `NO_ID`.
             before: time on the server's clock [s]; 0 for none.
         """
-        request = CancelGoal_Request(goal_info(id, int(before * NANO)))
-        return self._cancel.call(request).map(canceling)
+        request = CancelGoal_Request(goals.goal_info(id, int(before * NANO)))
+        return self._cancel.call(request).map(goals.canceling)
 
-    def get_result(self, goal: ClientGoal) -> Future[Outcome]:
+    def get_result(self, goal: ClientGoal) -> Future[goals.Outcome]:
         """Ask for the outcome of `goal`."""
 
-        def outcome(response: Any) -> Outcome:
-            status = goal_status(response.status)
+        def outcome(response: Any) -> goals.Outcome:
+            status = goals.goal_status(response.status)
             goal.learn(status)
-            return Outcome(status, response.result)
+            return goals.Outcome(status, response.result)
 
-        return self._result.call(self._type.GetResult.Request(to_uuid(goal.id))).map(outcome)
+        return self._result.call(self._type.GetResult.Request(goals.to_uuid(goal.id))).map(outcome)
 
     def close(self) -> None:
         """Stop; what is unanswered fails. Calling it again does nothing."""
@@ -146,7 +133,7 @@ class ActionClient:
         except CodecError:
             self.malformed += 1
             return
-        goal = self._goals.get(from_uuid(message.goal_id))
+        goal = self._goals.get(goals.from_uuid(message.goal_id))
         if goal is not None and goal.on_feedback is not None:
             goal.on_feedback(message.feedback)
 
@@ -157,6 +144,6 @@ class ActionClient:
             self.malformed += 1
             return
         for entry in message.status_list:
-            goal = self._goals.get(from_uuid(entry.goal_info.goal_id))
+            goal = self._goals.get(goals.from_uuid(entry.goal_info.goal_id))
             if goal is not None:
-                goal.learn(goal_status(entry.status))
+                goal.learn(goals.goal_status(entry.status))

@@ -2,13 +2,7 @@
 
 from __future__ import annotations
 
-from golem.middleware.rtps.announcements import (
-    READERS_READER,
-    READERS_WRITER,
-    WRITERS_READER,
-    WRITERS_WRITER,
-    Announced,
-)
+from golem.middleware.rtps import announcements
 from golem.middleware.rtps.reliable import Intake, Outbox
 
 MAX_ENDPOINTS = 4096
@@ -28,13 +22,13 @@ class FastDdsPeer:
         found: what it tells of its writers.
     """
 
-    def __init__(self, prefix: bytes, announced: Announced, address: str, now: float) -> None:
+    def __init__(self, prefix: bytes, announced: announcements.Announced, address: str, now: float) -> None:
         """Know nothing but this of it."""
         self.prefix, self.announced, self.address, self.seen = prefix, announced, address, now
         self.topics: dict[bytes, str] = {}
-        self.writers = Outbox(WRITERS_WRITER, WRITERS_READER, patience=float("inf"))
-        self.readers = Outbox(READERS_WRITER, READERS_READER, patience=float("inf"))
-        self.found = Intake(WRITERS_READER, WRITERS_WRITER)
+        self.writers = Outbox(announcements.WRITERS_WRITER, announcements.WRITERS_READER, patience=float("inf"))
+        self.readers = Outbox(announcements.READERS_WRITER, announcements.READERS_READER, patience=float("inf"))
+        self.found = Intake(announcements.WRITERS_READER, announcements.WRITERS_WRITER)
         self._replies: dict[tuple[bytes, bytes], Outbox] = {}
         self._requests: dict[bytes, Intake] = {}
 
@@ -61,7 +55,7 @@ class FastDdsPeer:
 
     def acknowledged(self, writer_id: bytes, reader_id: bytes) -> Outbox | None:
         """Return the stream between a writer of ours and a reader of this peer, if there is one."""
-        builtin = {WRITERS_WRITER: self.writers, READERS_WRITER: self.readers}
+        builtin = {announcements.WRITERS_WRITER: self.writers, announcements.READERS_WRITER: self.readers}
         return builtin.get(writer_id) or self._replies.get((writer_id, reader_id))
 
     def data_streams(self) -> list[Outbox]:

@@ -5,19 +5,9 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from golem.robots.model import contact_shapes, looks, magpie_model
+from golem.robots.model import contact_shapes, looks, magpie_model, table
 from golem.robots.model.contact_shapes import Feet, Shape
 from golem.robots.model.spatial import Inertial, quat_of
-from golem.robots.model.table import (
-    BASE_HEIGHT,
-    BASE_LINK,
-    DOF,
-    FRAMES,
-    JOINTS,
-    LINKS,
-    T_TORSO_HEAD_OPTICAL,
-    load_limits,
-)
 from golem.types import SIDES, Array, Side
 
 COLLISION_GROUP = 3
@@ -49,25 +39,25 @@ def robot_spec(
     Raises:
         ConfigError: unknown torque profile.
     """
-    limits = load_limits(torque)
+    limits = table.load_limits(torque)
     spec = mujoco.MjSpec()
     spec.modelname = "golem_h12"
     spec.compiler.degree = False
-    base = _add_body(spec.worldbody, BASE_LINK, LINKS[BASE_LINK], np.array([0, 0, BASE_HEIGHT]))
+    base = _add_body(spec.worldbody, table.BASE_LINK, table.LINKS[table.BASE_LINK], np.array([0, 0, table.BASE_HEIGHT]))
     base.add_freejoint(name="base")
-    bodies = {BASE_LINK: base}
-    for joint, limit in zip(JOINTS, limits.torque, strict=True):
+    bodies = {table.BASE_LINK: base}
+    for joint, limit in zip(table.JOINTS, limits.torque, strict=True):
         T = joint.T_parent_joint
-        body = _add_body(bodies[joint.parent], joint.child, LINKS[joint.child], T[:3, 3], T[:3, :3])
+        body = _add_body(bodies[joint.parent], joint.child, table.LINKS[joint.child], T[:3, 3], T[:3, :3])
         body.add_joint(
             name=joint.name,
             type=mujoco.mjtJoint.mjJNT_HINGE,
             axis=joint.axis,
             range=[joint.lower, joint.upper],
             limited=mujoco.mjtLimited.mjLIMITED_TRUE,
-            damping=[DOF.damping, 0, 0],
-            armature=DOF.armature,
-            frictionloss=DOF.frictionloss,
+            damping=[table.DOF.damping, 0, 0],
+            armature=table.DOF.armature,
+            frictionloss=table.DOF.frictionloss,
         )
         bodies[joint.child] = body
         _add_motor(spec, joint.name, float(limit))
@@ -150,8 +140,8 @@ def _add_camera(body: mujoco.MjsBody, name: str, T_body_optical: Array, fovy: fl
 def add_torso_sensors(spec: mujoco.MjSpec) -> None:
     """Add head camera and IMU; a site `imu` that is there already stays where it is."""
     torso = spec.body("torso_link")
-    _add_camera(torso, "head", T_TORSO_HEAD_OPTICAL, HEAD_FOVY)
-    T = FRAMES["imu_link"].T_parent_frame
+    _add_camera(torso, "head", table.T_TORSO_HEAD_OPTICAL, HEAD_FOVY)
+    T = table.FRAMES["imu_link"].T_parent_frame
     if spec.site("imu") is None:
         torso.add_site(name="imu", pos=T[:3, 3], quat=quat_of(T[:3, :3]), size=[0.01] * 3, group=4)
     for name, kind in (

@@ -15,6 +15,7 @@ from golem.robots.model import magpie_model
 from golem.robots.model.imu_mount import torso_motion
 from golem.robots.model.leg_kinematics import leg_poses, sole_centers
 from golem.robots.model.table import BASE_LINK, load_limits
+from golem.robots.mujoco import twin_stages
 from golem.robots.mujoco.camera import CameraRig
 from golem.robots.mujoco.config import WORKSHOPS, MujocoConfig
 from golem.robots.mujoco.external_forces import Pushes
@@ -24,15 +25,6 @@ from golem.robots.mujoco.lidar_sensor import LidarMoment, LidarSensor
 from golem.robots.mujoco.motors import Motors
 from golem.robots.mujoco.scene import COARSE_STEP, FINE_STEP, Scene, build_scene, nominal_layout
 from golem.robots.mujoco.truth import Truth
-from golem.robots.mujoco.twin_stages import (
-    TWIN,
-    act_code,
-    delicate,
-    keep_moment_of,
-    put_simulation,
-    put_watch,
-    sense_code,
-)
 from golem.robots.sensors.auto_exposure import AutoExposure
 from golem.robots.sensors.cameras import CAMERAS
 from golem.robots.sensors.depth import StereoDepth
@@ -99,7 +91,7 @@ class MujocoRobot:
             for name in CAMERAS
         }
         self._mirrors = mirror_geoms(model, conditions) if self.config.world in WORKSHOPS else None
-        self._memory = memory = new_record(TWIN)
+        self._memory = memory = new_record(twin_stages.TWIN)
         noise = stream(seed, "imu")
         self._imu_model = ImuModel(self.profile.imu, self._errors.imu, noise, memory["imu"])
         self._hoist = Hoist(model, hoist, memory["hoist"])
@@ -137,7 +129,7 @@ class MujocoRobot:
     def _put_world(self) -> None:
         """Write into the memory of the stages what the world is like, and where it is."""
         memory, model, names = self._memory, self._model, self.scene.names.screws
-        put_simulation(memory, model, self.data)
+        twin_stages.put_simulation(memory, model, self.data)
         memory["base_q"], memory["base_v"] = self._base.qposadr[0], self._base.dofadr[0]
         memory["acc"], memory["near"] = self._acc.start, self.config.near
         memory["fingers"] = [model.body(f"{s}_{f}_finger").id for s in SIDES for f in magpie_model.FINGERS]
@@ -159,7 +151,9 @@ class MujocoRobot:
         if not self._compiled:
             return None
         self._memory["joint_offset"] = 0.0 if joint_offset is None else joint_offset
-        return CompiledStage(sense_code(), self._memory), CompiledStage(act_code(), self._memory)
+        return CompiledStage(twin_stages.sense_code(), self._memory), CompiledStage(
+            twin_stages.act_code(), self._memory
+        )
 
     @property
     def _compiled(self) -> bool:
@@ -179,7 +173,7 @@ class MujocoRobot:
         if self._watched is not None or not self._compiled:
             return False
         self._watched = kinds
-        return put_watch(self._memory, self.data, kinds)
+        return twin_stages.put_watch(self._memory, self.data, kinds)
 
     def take_hand_command(self, side: Side, command: HandCommand) -> None:
         """Take the command of one hand; see `HasStages`."""
@@ -230,7 +224,7 @@ class MujocoRobot:
 
     def advance(self, command: LowCommand, hands: dict[Side, HandCommand], dt: float) -> None:
         """Let time pass; see `Robot`."""
-        self._memory["fine"] = fine = delicate(self._memory[0])
+        self._memory["fine"] = fine = twin_stages.delicate(self._memory[0])
         step = FINE_STEP if fine else COARSE_STEP
         self._model.opt.timestep = step
         for side, hand in hands.items():
@@ -319,7 +313,7 @@ class MujocoRobot:
 
     def keep_moment(self, t: float) -> None:
         """Keep the present moment for the LiDAR; see `HasStages`."""
-        keep_moment_of(address(self._memory), t)
+        twin_stages.keep_moment_of(address(self._memory), t)
 
     def save_state(self) -> bytes:
         """Return the present moment; see `Restorable`."""

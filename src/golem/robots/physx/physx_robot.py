@@ -13,17 +13,7 @@ import numpy as np
 from golem.errors import ConfigError, MissingExtra
 from golem.robots.model.spatial import quat_to_axis
 from golem.robots.model.table import BASE_LINK
-from golem.robots.mujoco.other_engine import (
-    CONTACT_OFFSET,
-    FINGER_DRIVE,
-    POSITION_ITERATIONS,
-    VELOCITY_ITERATIONS,
-    Motion,
-    OtherEngineConfig,
-    OtherEngineRobot,
-    follower_names,
-    touchable,
-)
+from golem.robots.mujoco import other_engine
 from golem.robots.mujoco.truth import Truth
 from golem.types import SIDES, Array
 
@@ -89,8 +79,8 @@ def build_bodies(model: mujoco.MjModel, friction: float) -> PhysxBodies:
     physx.set_scene_config(config)
     body = physx.get_body_config()
     body.sleep_threshold = 0.0
-    body.solver_position_iterations = POSITION_ITERATIONS
-    body.solver_velocity_iterations = VELOCITY_ITERATIONS
+    body.solver_position_iterations = other_engine.POSITION_ITERATIONS
+    body.solver_velocity_iterations = other_engine.VELOCITY_ITERATIONS
     physx.set_body_config(body)
     system = physx.PhysxCpuSystem()
     scene = sapien.Scene([system])
@@ -183,14 +173,14 @@ class _Maker:
     def _shapes(self, component: Any, body: int, foreign: bool) -> bool:
         """Attach what of a body can be touched; return whether there is anything."""
         model = self._model
-        geoms = touchable(model, body)
+        geoms = other_engine.touchable(model, body)
         for g in geoms:
             sliding = float(model.geom_friction[g, 0])
             material = self._world if foreign else self._physx.PhysxMaterial(sliding, sliding, 0.0)
             shape, turned = self._shape(g, material)
             pose = self.pose(model.geom_pos[g], model.geom_quat[g])
             shape.set_local_pose(pose * self.pose(np.zeros(3), _ALONG_X) if turned else pose)
-            shape.set_contact_offset(CONTACT_OFFSET)
+            shape.set_contact_offset(other_engine.CONTACT_OFFSET)
             shape.set_rest_offset(0.0)
             shape.set_collision_groups([int(model.geom_contype[g]), int(model.geom_conaffinity[g]), 0, 0])
             component.attach(shape)
@@ -258,13 +248,13 @@ class PhysxTruth(Truth):
 
 
 @dataclass(frozen=True)
-class PhysxConfig(OtherEngineConfig):
+class PhysxConfig(other_engine.OtherEngineConfig):
     """Options of the twin in PhysX; see `OtherEngineConfig`."""
 
     ENGINE: ClassVar[str] = "PhysX"
 
 
-class PhysxRobot(OtherEngineRobot):
+class PhysxRobot(other_engine.OtherEngineRobot):
     """The twin in PhysX; see `golem.robots.base.Robot`.
 
     Motors, hands, hoist, sensor errors and pictures are those of the MuJoCo twin, whose model is put where PhysX has
@@ -287,10 +277,10 @@ class PhysxRobot(OtherEngineRobot):
         active = self._bodies.articulation.get_active_joints()
         names = [joint.name for joint in active]
         self._followers = [
-            (active[names.index(finger)], names.index(crank)) for finger, crank in follower_names().items()
+            (active[names.index(finger)], names.index(crank)) for finger, crank in other_engine.follower_names().items()
         ]
         for joint, _ in self._followers:
-            joint.set_drive_properties(*FINGER_DRIVE)
+            joint.set_drive_properties(*other_engine.FINGER_DRIVE)
         self._torso_link = self._bodies.links[model.body("torso_link").id]
         self._place()
         self.truth = PhysxTruth(model, self.data, self._bodies)
@@ -325,7 +315,7 @@ class PhysxRobot(OtherEngineRobot):
         data.time += dt
         pose = self._root.entity_pose
         q = bodies.articulation.get_qpos().astype(float)
-        self._follow(Motion(pose.p, pose.q, _motion_of(self._root), _motion_of(self._torso_link), q), dt)
+        self._follow(other_engine.Motion(pose.p, pose.q, _motion_of(self._root), _motion_of(self._torso_link), q), dt)
 
 
 def _motion_of(link: Any) -> tuple[Array, Array]:

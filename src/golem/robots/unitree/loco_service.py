@@ -9,16 +9,7 @@ from __future__ import annotations
 
 import math
 
-from golem.interfaces.unitree_api import (
-    BAD_PARAMETER,
-    GET_VERSION,
-    NOT_IMPLEMENTED,
-    OK,
-    LocoApi,
-    decode_int,
-    decode_velocity,
-    encode,
-)
+from golem.interfaces import unitree_api
 from golem.middleware.wire.api import ApiRequest, Response
 from golem.types import Twist
 
@@ -34,7 +25,7 @@ class LocoService:
         released: whether the motion switcher has taken the legs away; every call but for the version is refused then.
     """
 
-    def __init__(self, api: LocoApi) -> None:
+    def __init__(self, api: unitree_api.LocoApi) -> None:
         """Begin limp, as after power-on."""
         self.api = api
         self.state = api.zero_torque
@@ -49,7 +40,7 @@ class LocoService:
         try:
             code, data = self._act(request, t)
         except ValueError as error:
-            code, data = BAD_PARAMETER, str(error)
+            code, data = unitree_api.BAD_PARAMETER, str(error)
         return Response(request.id, request.api_id, code, data)
 
     def twist(self, t: float) -> Twist:
@@ -72,25 +63,25 @@ class LocoService:
 
     def _act(self, request: ApiRequest, t: float) -> tuple[int, str]:
         api = self.api
-        if request.api_id == GET_VERSION:
-            return OK, api.version
+        if request.api_id == unitree_api.GET_VERSION:
+            return unitree_api.OK, api.version
         if self.released:
             return api.not_available, "the motion mode is released"
         if request.api_id == api.get_fsm_id:
-            return OK, encode({"data": self.state})
+            return unitree_api.OK, unitree_api.encode({"data": self.state})
         if request.api_id == api.set_fsm_id:
-            wanted = decode_int(request.parameter)
+            wanted = unitree_api.decode_int(request.parameter)
             if not self._reachable(wanted):
                 return api.invalid_fsm_id, self.failure
             self._enter(wanted)
-            return OK, ""
+            return unitree_api.OK, ""
         if request.api_id == api.set_velocity:
-            velocity, duration = decode_velocity(request.parameter)
+            velocity, duration = unitree_api.decode_velocity(request.parameter)
             if self.state != api.start:
                 return api.not_available, self.failure
             self._twist, self._until = Twist(*velocity), t + duration
-            return OK, ""
-        return NOT_IMPLEMENTED, ""
+            return unitree_api.OK, ""
+        return unitree_api.NOT_IMPLEMENTED, ""
 
     def _reachable(self, state: int) -> bool:
         api = self.api

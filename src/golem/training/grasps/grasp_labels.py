@@ -22,17 +22,7 @@ from golem.robots.model.spatial import quat_of
 from golem.robots.mujoco.hand_servos import HandServos
 from golem.robots.sensors.streams import stream
 from golem.robots.worlds.tableware import KINDS
-from golem.training.grasps.ware_scene import (
-    LEADER,
-    SIDE,
-    STEP,
-    WARE,
-    WRIST,
-    WareDraw,
-    build_world,
-    draw_ware,
-    palm_cloud,
-)
+from golem.training.grasps import ware_scene
 from golem.types import Array, Detection, HandCommand, LocalizedObject
 
 BEFORE, SPARE = 0.12, 0.024
@@ -56,10 +46,10 @@ class GraspTrial:
     def __init__(self, model: mujoco.MjModel) -> None:
         """Let the ware of `model` come to rest."""
         self.model, self.data = model, mujoco.MjData(model)
-        self._leader = int(model.body(LEADER).mocapid[0])
-        self._ware, self._wrist = model.body(WARE).id, model.body(WRIST).id
-        self._wrist_q = int(model.joint(WRIST).qposadr[0])
-        self._servos = HandServos(model, SIDE)
+        self._leader = int(model.body(ware_scene.LEADER).mocapid[0])
+        self._ware, self._wrist = model.body(ware_scene.WARE).id, model.body(ware_scene.WRIST).id
+        self._wrist_q = int(model.joint(ware_scene.WRIST).qposadr[0])
+        self._servos = HandServos(model, ware_scene.SIDE)
         far = np.eye(4)
         far[2, 3] = 1.0
         self._put(far, 0.08)
@@ -109,7 +99,7 @@ class GraspTrial:
         command = HandCommand(t=0.0, gap=gap, force=force)
         for T in poses:
             self._aim(T)
-            self._servos.command(command, STEP)
+            self._servos.command(command, ware_scene.STEP)
             self._servos.drive(self.data)
             mujoco.mj_step(self.model, self.data)
 
@@ -124,7 +114,7 @@ class GraspTrial:
 
 def _line(start: Array, end: Array, seconds: float) -> Iterable[Array]:
     """Yield poses that go smoothly from one place to another."""
-    for s in np.linspace(0.0, 1.0, round(seconds / STEP)):
+    for s in np.linspace(0.0, 1.0, round(seconds / ware_scene.STEP)):
         T = end.copy()
         T[:3, 3] += (1.0 - s * s * (3.0 - 2.0 * s)) * (start - end)[:3, 3]
         yield T
@@ -132,14 +122,14 @@ def _line(start: Array, end: Array, seconds: float) -> Iterable[Array]:
 
 def _still(T: Array, seconds: float) -> Iterable[Array]:
     """Yield the same pose."""
-    for _ in range(round(seconds / STEP)):
+    for _ in range(round(seconds / ware_scene.STEP)):
         yield T
 
 
 def _shaken(T: Array, seconds: float) -> Iterable[Array]:
     """Yield poses that swing sideways, and tilt."""
-    for k in range(round(seconds / STEP)):
-        phase = 2.0 * np.pi * RATE * k * STEP
+    for k in range(round(seconds / ware_scene.STEP)):
+        phase = 2.0 * np.pi * RATE * k * ware_scene.STEP
         swung = T.copy()
         swung[:3, :3] = Rotation.from_rotvec([0.0, TILT * np.sin(phase), 0.0]).as_matrix() @ T[:3, :3]
         swung[:3, 3] += SWING * np.array([np.sin(phase), np.sin(0.5 * phase), 0.0])
@@ -182,11 +172,11 @@ class GraspLabels:
 def label_ware(seed: int, split: str, number: int) -> GraspLabels:
     """Return the labels of one ware; depends on the arguments only."""
     rng = stream(seed, f"grasps/{split}/{number}")
-    draw = draw_ware(rng)
-    model = build_world(draw)
-    pads = [model.geom(magpie_model.finger_names(SIDE, finger)[2]).id for finger in magpie_model.FINGERS]
+    draw = ware_scene.draw_ware(rng)
+    model = ware_scene.build_world(draw)
+    pads = [model.geom(magpie_model.finger_names(ware_scene.SIDE, finger)[2]).id for finger in magpie_model.FINGERS]
     model.geom_friction[pads, 0] = rng.uniform(*FRICTION)
-    mass, ware = rng.uniform(*MASS), model.body(WARE).id
+    mass, ware = rng.uniform(*MASS), model.body(ware_scene.WARE).id
     model.body_mass[ware] *= mass
     model.body_inertia[ware] *= mass
     trial = GraspTrial(model)
@@ -200,21 +190,21 @@ def label_ware(seed: int, split: str, number: int) -> GraspLabels:
 
 
 def propose(
-    model: mujoco.MjModel, data: mujoco.MjData, draw: WareDraw, rng: np.random.Generator
+    model: mujoco.MjModel, data: mujoco.MjData, draw: ware_scene.WareDraw, rng: np.random.Generator
 ) -> tuple[list[Grasp], Array]:
     """Return what `antipodal` proposes for the ware as a palm camera sees it, and the ware's points (n, 3)."""
-    middle = data.xipos[model.body(WARE).id]
+    middle = data.xipos[model.body(ware_scene.WARE).id]
     yaw = float(rng.uniform(-np.pi, np.pi))
     place = middle - WATCH * draw.approach + rng.normal(0.0, 0.015, 3)
     T = grasp_pose(place, yaw, -draw.approach)
     camera = T @ np.linalg.inv(magpie_model.T_HAND_GRIPPER) @ magpie_model.T_HAND_CAMERA
-    points, own = palm_cloud(model, data, camera, rng)
+    points, own = ware_scene.palm_cloud(model, data, camera, rng)
     seen = points[own]
     if len(seen) < MIN_POINTS:
         return [], seen
     position = seen[int(((seen - np.median(seen, axis=0)) ** 2).sum(axis=1).argmin())]
     target = LocalizedObject(Detection(draw.kind, 1.0, np.zeros(4), np.zeros(2)), 0.0, position, seen)
-    grasps = Antipodal().propose(target, points, Gripper(SIDE, T, yaw, draw.approach))
+    grasps = Antipodal().propose(target, points, Gripper(ware_scene.SIDE, T, yaw, draw.approach))
     return grasps, object_points(seen, position)
 
 
