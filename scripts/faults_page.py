@@ -10,7 +10,7 @@ from pathlib import Path
 import tyro
 
 from golem.evaluation.faults.catalogue import FAULTS
-from golem.evaluation.faults.injection import FaultSource
+from golem.evaluation.faults.rig import FaultSource
 from golem.evaluation.harness.records import TrialRecord, read_records
 from golem.evaluation.metrics.text_table import TextTable
 

@@ -17,7 +17,7 @@ from golem.middleware.bus import Bus, News
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.nodes import SkillNode
 from golem.skills.base import StageFailed
-from golem.skills.legs_interface import LegsInterface
+from golem.skills.body_interface import LegsInterface
 from golem.skills.runner import LACKS
 from golem.types import Array, PlanarPose, Twist
 

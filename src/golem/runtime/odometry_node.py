@@ -13,8 +13,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from golem.capabilities.mapping.base import Mapper
 from golem.capabilities.mapping.floor_plane import FloorPlane
 from golem.capabilities.mapping.map_file import StoredMap, save_map
-from golem.capabilities.mapping.robot_filter import RobotFilter
-from golem.capabilities.mapping.scan_kernel import posed, sound
+from golem.capabilities.mapping.robot_filter import RobotFilter, posed, sound
 from golem.capabilities.odometry.base import LidarOdometry, OdometryEstimate
 from golem.errors import OutputError
 from golem.interfaces import topics

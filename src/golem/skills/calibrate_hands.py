@@ -10,9 +10,9 @@ from golem.capabilities.calibration.kinematic_fit import ZERO
 from golem.options import require
 from golem.robots.sensors.calibration import Calibration, read_calibration
 from golem.skills.base import SkillResult, StageFailed
+from golem.skills.calibrate import TagLooks
 from golem.skills.context import Context
 from golem.skills.kept_file import KeptFileConfig, check_file_name, kept_file
-from golem.skills.tag_looks import TagLooks
 from golem.types import SIDES
 
 AHEAD = 0.1

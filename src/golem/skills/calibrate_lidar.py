@@ -14,10 +14,10 @@ from golem.interfaces import topics
 from golem.options import require
 from golem.robots.sensors.calibration import read_calibration
 from golem.skills.base import SkillResult, StageFailed
+from golem.skills.calibrate import FRAME_TIME, SPEED, WORK_PLACE
 from golem.skills.context import Context
 from golem.skills.kept_file import KeptFileConfig, check_file_name, kept_file
 from golem.skills.planned_motion import PlannedMotion
-from golem.skills.tag_looks import FRAME_TIME, SPEED, WORK_PLACE
 from golem.types import SIDES, CameraInfo
 
 CAMERA = "head"

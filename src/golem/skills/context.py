@@ -22,9 +22,8 @@ from golem.interfaces.payloads import Feedback
 from golem.middleware.bus import Bus, Topic
 from golem.robots.model.pinocchio_model import Kinematics
 from golem.skills.base import Skill, SkillResult, StageFailed, Tick, expect
-from golem.skills.body_interface import HandInterface, Navigation, follow
+from golem.skills.body_interface import HandInterface, LegsInterface, Navigation, follow
 from golem.skills.detection_stream import DetectionStream
-from golem.skills.legs_interface import LegsInterface
 from golem.skills.pursuit import call
 from golem.types import SIDES, UPPER, Array, LocalizedObject, PalmTargets, PlanarPose, Side
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from golem.capabilities.legs.balance_errors import VelocityIntegratorConfig
 from golem.capabilities.legs.gait import GaitConfig
 from golem.capabilities.legs.gait_clock import LOADED, SMOOTHING, STOOD
-from golem.capabilities.legs.velocity_integrator import VelocityIntegratorConfig
 from golem.robots.model.imu_mount import sensed_base_rate
 from golem.robots.model.leg_kinematics import SOLE_CENTER
 from golem.robots.model.pinocchio_model import Kinematics

@@ -9,10 +9,9 @@ import pytest
 from tests.capabilities.legs.clock_twin import ClockTwin, stand_errors
 from tests.capabilities.legs.recorder import crouching
 
-from golem.capabilities.legs.balance_errors import balance_errors
+from golem.capabilities.legs.balance_errors import VelocityIntegrator, VelocityIntegratorConfig, balance_errors
 from golem.capabilities.legs.gait import Gait, GaitConfig
 from golem.capabilities.legs.gait_clock import GaitClock, StopPredictor
-from golem.capabilities.legs.velocity_integrator import VelocityIntegrator, VelocityIntegratorConfig
 from golem.robots.model.spatial import rotation_rpy
 from golem.types import BaseEstimate, Imu, LowState, Twist
 

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from tests.capabilities.legs.recorder import Recorder, crouching, still
 
+from golem.capabilities.legs.balance_errors import VelocityIntegratorConfig
 from golem.capabilities.legs.base import Envelope
 from golem.capabilities.legs.gait import GaitConfig
 from golem.capabilities.legs.handover import Handover, HandoverConfig, HandoverPart
 from golem.capabilities.legs.locomotion import Locomotion, LocomotionConfig
-from golem.capabilities.legs.velocity_integrator import VelocityIntegratorConfig
 from golem.errors import ConfigError
 from golem.types import BaseEstimate, LowState, Twist
 

@@ -12,10 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.capabilities.legs.recorder import Recorder, crouching, still
 
+from golem.capabilities.legs.balance_errors import VelocityIntegratorConfig
 from golem.capabilities.legs.base import Envelope
 from golem.capabilities.legs.gait import GaitConfig
 from golem.capabilities.legs.locomotion import Locomotion, LocomotionConfig
-from golem.capabilities.legs.velocity_integrator import VelocityIntegratorConfig
 from golem.errors import ConfigError
 from golem.interfaces.payloads import LegCommand
 from golem.types import Array, Twist

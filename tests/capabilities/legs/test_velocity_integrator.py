@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from golem.capabilities.legs.velocity_integrator import VelocityIntegrator, VelocityIntegratorConfig
+from golem.capabilities.legs.balance_errors import VelocityIntegrator, VelocityIntegratorConfig
 from golem.types import Array
 
 DT = 0.01

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from golem.capabilities.mapping.robot_filter import ASTRAY, MARGIN, RobotFilter
-from golem.capabilities.mapping.scan_kernel import posed, sound
+from golem.capabilities.mapping.robot_filter import ASTRAY, MARGIN, RobotFilter, posed, sound
 from golem.capabilities.mapping.voxel_kernel import span, within
 
 ARM = ("shoulder", "elbow", "wrist", "hand", "crank", "finger")

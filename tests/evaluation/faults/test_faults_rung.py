@@ -7,8 +7,8 @@ import pytest
 from golem.errors import ConfigError
 from golem.evaluation.base import TrialSpec
 from golem.evaluation.faults.catalogue import FAULTS
-from golem.evaluation.faults.injection import Expect, FaultSource, Injection
 from golem.evaluation.faults.judge import FaultFinding, verdict
+from golem.evaluation.faults.rig import Expect, FaultSource, Injection
 from golem.evaluation.rungs.faults import FaultOptions, FaultsRung
 from golem.interfaces.payloads import GateState, Reason
 

@@ -10,8 +10,7 @@ import pytest
 from golem.errors import ConfigError
 from golem.evaluation.base import Case, TrialSpec
 from golem.evaluation.episodes.episode import episode_seed
-from golem.evaluation.rungs.counter import CounterOptions, CounterTether, draw_errand
-from golem.evaluation.rungs.fetch_errand import FetchRung
+from golem.evaluation.rungs.counter import CounterOptions, CounterTether, FetchRung, draw_errand
 from golem.registry import configure
 from golem.robots.mujoco.config import MujocoConfig
 from golem.robots.mujoco.scene import lay_kitchen

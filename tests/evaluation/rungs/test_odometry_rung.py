@@ -10,7 +10,7 @@ import pytest
 from golem.capabilities.odometry.base import OdometryEstimate
 from golem.errors import ConfigError
 from golem.evaluation.base import TrialSpec
-from golem.evaluation.episodes.odometry_judge import PoseTrack, ate, end_error, nees, range_and_bearing
+from golem.evaluation.episodes.lidar_walk import PoseTrack, ate, end_error, nees, range_and_bearing
 from golem.evaluation.harness.ladder import LadderConfig, run_ladder
 from golem.evaluation.rungs.odometry import CONDITIONS, OdometryOptions, OdometryRung
 from golem.robots.model.spatial import rotation_rpy, transform

@@ -10,7 +10,7 @@ from golem.capabilities.arms.arm_kinematics import UpperKinematics
 from golem.capabilities.arms.postures import POSTURES
 from golem.interfaces import public
 from golem.middleware.bus import Bus
-from golem.runtime.live.stack_out import MEAN, encoders
+from golem.runtime.live.stack_streams import MEAN, encoders
 from golem.types import NUM_JOINTS, SIDES, UPPER, Imu, LowState, Side
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from golem.middleware.bus import Bus, News, Topic
-from golem.runtime.live.stack_in import OnePerTick
+from golem.runtime.live.stack_streams import OnePerTick
 
 NUMBER = Topic("number", int)
 

@@ -29,7 +29,7 @@ from golem.runtime.live.bridge import outgoing
 from golem.runtime.live.role_endpoints import RoleEndpoints
 from golem.runtime.live.safety_main import SafetyConfig, run_safety
 from golem.runtime.live.safety_process import SafetyProcess
-from golem.runtime.live.stack_out import encoders
+from golem.runtime.live.stack_streams import encoders
 from golem.stack import Choice
 from golem.types import NUM_JOINTS, Imu, LowCommand, LowState
 

@@ -14,9 +14,8 @@ import math
 
 import numpy as np
 
-from golem.capabilities.legs.balance_errors import stand_errors
+from golem.capabilities.legs.balance_errors import TRIM, VelocityIntegrator, stand_errors, step_trim
 from golem.capabilities.legs.gait import GAIT, GAIT_OPTIONS, Gait, step_gait
-from golem.capabilities.legs.velocity_integrator import TRIM, VelocityIntegrator, step_trim
 from golem.hardware.servo.gravity import body_tree
 from golem.kernels import njit
 from golem.native import Record, address, new_record, view

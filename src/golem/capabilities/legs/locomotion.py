@@ -17,12 +17,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from golem.capabilities.legs.balance_errors import VelocityIntegrator, VelocityIntegratorConfig
 from golem.capabilities.legs.base import STANDING, ZERO, LocomotionCommand, LowerBody, follows
 from golem.capabilities.legs.gait import Bools, Gait
 from golem.capabilities.legs.gait_clock import GaitClock, StopPredictor
 from golem.capabilities.legs.handover import CommandBlender
 from golem.capabilities.legs.rate_divider import RateDivider
-from golem.capabilities.legs.velocity_integrator import VelocityIntegrator, VelocityIntegratorConfig
 from golem.interfaces.payloads import LegCommand
 from golem.options import require
 from golem.robots.model.leg_dynamics import LEG, LegDynamics

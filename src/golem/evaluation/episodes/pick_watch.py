@@ -10,7 +10,7 @@ import numpy as np
 
 from golem.evaluation.base import DONE
 from golem.evaluation.episodes.contacts import FLOOR
-from golem.evaluation.episodes.errand_watch import ErrandWatch
+from golem.evaluation.episodes.counter_watch import ErrandWatch
 from golem.evaluation.episodes.oracle import GraspTruth, Oracle
 from golem.evaluation.episodes.pick_claims import Fastener
 from golem.interfaces import topics

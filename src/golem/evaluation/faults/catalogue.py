@@ -12,7 +12,7 @@ import numpy as np
 from golem.evaluation.faults.class_faults import KNEE, LYING, by_imu, class_faults, scaled, turned
 from golem.evaluation.faults.command_faults import JOINTS, LIMITS, command_faults
 from golem.evaluation.faults.data_faults import data_faults
-from golem.evaluation.faults.injection import Expect, FaultMoment, FaultSource, Frames, Injection, by_command, by_state
+from golem.evaluation.faults.rig import Expect, FaultMoment, FaultSource, Frames, Injection, by_command, by_state
 from golem.interfaces.payloads import Reason
 from golem.middleware.wire.convert import encode_low_command
 from golem.robots.model.table import JOINT_INDEX

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from golem.evaluation.faults.command_faults import JOINTS, LIMITS, PARTS, SENDER, TORQUE
-from golem.evaluation.faults.injection import Edit, Expect, FaultMoment, FaultSource, Injection, by_command, by_state
+from golem.evaluation.faults.rig import Edit, Expect, FaultMoment, FaultSource, Injection, by_command, by_state
 from golem.interfaces.payloads import Reason
 from golem.robots.model.table import JOINT_INDEX
 from golem.types import LEGS, NUM_JOINTS, Array, Imu, LowCommand, LowState

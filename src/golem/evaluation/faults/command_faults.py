@@ -7,15 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from golem.evaluation.faults.injection import (
-    Expect,
-    FaultMoment,
-    FaultSource,
-    Frames,
-    Injection,
-    by_command,
-    edited_command,
-)
+from golem.evaluation.faults.rig import Expect, FaultMoment, FaultSource, Frames, Injection, by_command, edited_command
 from golem.interfaces.payloads import Reason
 from golem.robots.model.table import JOINT_INDEX, load_limits
 from golem.types import LEGS, NUM_JOINTS, UPPER

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from golem.evaluation.faults.command_faults import JOINTS, LIMITS
-from golem.evaluation.faults.injection import Expect, FaultMoment, FaultSource, Frames, Injection, by_state
+from golem.evaluation.faults.rig import Expect, FaultMoment, FaultSource, Frames, Injection, by_state
 from golem.interfaces.payloads import Reason
 from golem.robots.model.table import JOINT_INDEX
 from golem.types import Array, Imu, LowState

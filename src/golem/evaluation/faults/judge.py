@@ -11,8 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from golem.evaluation.faults.injection import Expect, FaultSource, Injection
-from golem.evaluation.faults.rig import FaultRig
+from golem.evaluation.faults.rig import Expect, FaultRig, FaultSource, Injection
 from golem.interfaces import topics
 from golem.interfaces.payloads import GateState, Reason
 from golem.robots.model.table import JOINT_NAMES, load_limits

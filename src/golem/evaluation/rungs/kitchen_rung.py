@@ -11,8 +11,8 @@ from typing import Any, ClassVar, Protocol, TypeVar
 
 from golem.errors import ConfigError
 from golem.evaluation.base import DONE, Rung, TrialOutcome, TrialSpec
+from golem.evaluation.episodes.counter_watch import ErrandWatch
 from golem.evaluation.episodes.episode import lost
-from golem.evaluation.episodes.errand_watch import ErrandWatch
 from golem.evaluation.episodes.oracle import Oracle
 from golem.evaluation.episodes.true_masks import build_seeing, with_modules
 from golem.evaluation.rungs.pick_screw import ABORTED, SLOT, balance, let_go

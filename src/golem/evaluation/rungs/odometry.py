@@ -16,8 +16,17 @@ from golem import registry
 from golem.capabilities.odometry.base import LidarOdometry, OdometryEstimate
 from golem.evaluation.base import DONE, Case, Results, Rung, TrialOutcome, TrialSpec
 from golem.evaluation.episodes.episode import legs_stack
-from golem.evaluation.episodes.lidar_walk import START, LidarWalk, Route, record_walk
-from golem.evaluation.episodes.odometry_judge import PoseTrack, ate, end_error, nees, range_and_bearing
+from golem.evaluation.episodes.lidar_walk import (
+    START,
+    LidarWalk,
+    PoseTrack,
+    Route,
+    ate,
+    end_error,
+    nees,
+    range_and_bearing,
+    record_walk,
+)
 from golem.interfaces import lidar_convert, public
 from golem.interfaces.lidar import ExternalOdometry, LegOdometry, LidarImu, LidarScan
 from golem.middleware.bags.base import BagMessage

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from golem.evaluation.base import DONE, TrialSpec
-from golem.evaluation.episodes.errand_watch import ErrandWatch
+from golem.evaluation.episodes.counter_watch import ErrandWatch
 from golem.evaluation.episodes.oracle import Oracle
 from golem.evaluation.rungs.kitchen_rung import Errand, KitchenRung, Verdict
 from golem.robots.mujoco.balance import BalanceRecorder

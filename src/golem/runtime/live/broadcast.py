@@ -20,7 +20,7 @@ from golem.middleware.ros.node import RosNode
 from golem.middleware.wire.convert import MODE_MACHINE, encode_low_command
 from golem.robots.base import Robot
 from golem.runtime.executor import Executor, Node, Phase
-from golem.runtime.live import robot_out, stack_out
+from golem.runtime.live import robot_out, stack_streams
 from golem.runtime.live.bridge import outgoing
 from golem.runtime.live.role_endpoints import RoleEndpoints
 from golem.runtime.live.safety_status import StatusReports
@@ -91,7 +91,7 @@ def _nodes(bus: Bus, robot: Robot, domain: LocalDomain) -> list[Node]:
     placed = [
         *outgoing(bus, body, robot_out.encoders(bus)),
         *outgoing(bus, safety, {"/lowcmd": command}, without=("/safety/status",)),
-        *outgoing(bus, stack, stack_out.encoders(bus, lambda: MODE_MACHINE)),
+        *outgoing(bus, stack, stack_streams.encoders(bus, lambda: MODE_MACHINE)),
         (Phase.SEND, StatusOut(bus, safety)),
     ]
     return [node for _, node in placed]
