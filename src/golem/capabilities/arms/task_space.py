@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -88,30 +88,22 @@ class TaskSpaceConfig:
         Raises:
             ConfigError: a value is out of range; the message names it.
         """
-        positive = (
-            "rate", "position_weight", "rotation_weight", "damping", "arm_speed", "torso_speed", "torso_range",
-            "palm_speed", "palm_turn",
-        )  # fmt: skip
-        for name in positive:
+        for name in _POSITIVE:
             if not getattr(self, name) > 0.0:
                 raise ConfigError(f"The arm controller's option {name} must be positive, not {getattr(self, name)}.")
-        for name in (
-            "latency",
-            "posture_weight",
-            "torso_weight",
-            "posture_rate",
-            "error_damping",
-            "singular_value",
-            "singular_damping",
-            "limit_margin",
-            "collision_rows",
-            "clearance",
-        ):
-            if not getattr(self, name) >= 0.0:
-                raise ConfigError(f"The arm controller's option {name} must not be negative.")
         for name in ("palm_gain", "collision_gain"):
             if not 0.0 < getattr(self, name) <= 1.0:
                 raise ConfigError(f"The arm controller's option {name} must lie in (0, 1], not {getattr(self, name)}.")
+        for name, value in asdict(self).items():
+            if name != "posture" and not value >= 0.0:
+                raise ConfigError(f"The arm controller's option {name} must not be negative.")
+
+
+_POSITIVE = (
+    *("rate", "position_weight", "rotation_weight", "damping", "arm_speed", "torso_speed", "torso_range"),
+    *("palm_speed", "palm_turn"),
+)
+"""Options that are more than 0; the others, all but the posture, are at least that."""
 
 
 @dataclass(frozen=True, slots=True)
