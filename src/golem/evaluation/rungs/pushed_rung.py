@@ -14,7 +14,7 @@ from functools import partial
 from typing import Literal, Protocol, TypeVar
 
 from golem.errors import ConfigError, ModuleFault, unknown_name
-from golem.evaluation.base import TrialOutcome, TrialSpec
+from golem.evaluation.base import Rung, TrialOutcome, TrialSpec
 from golem.evaluation.episodes.episode import Episode, Loss
 from golem.evaluation.episodes.plain_episode import PlainEpisode
 from golem.evaluation.episodes.scripted_motion import ArmMotion, ScriptedMotion
@@ -183,6 +183,7 @@ class PushedRung(LegRung[O]):
     provokes = True
     default_n = 20
     default_profile = "bench"
+    run = Rung.run  # one alone is pushed as several are
 
     def __init__(self, options: O | None = None) -> None:
         """Check the directions and phases; see `Rung`."""
