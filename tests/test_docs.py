@@ -89,10 +89,11 @@ def test_an_example_keeps_the_contract_of_its_slot(
 
 
 def test_every_slot_has_its_contract_on_the_page() -> None:
-    page = (DOCS / "reference/contracts.md").read_text(encoding="utf-8")
+    contracts = (DOCS / "reference/contracts.md").read_text(encoding="utf-8")
     for slot, row in SLOTS.items():
-        module = row.contract.partition(":")[0]
-        assert f"::: {module}\n" in page and f"`src/{module.replace('.', '/')}.py`" in page, slot
+        module, _, name = row.contract.partition(":")
+        section = contracts.partition(f"`src/{module.replace('.', '/')}.py`")[2].partition("\n## ")[0]
+        assert f"### `{name}`\n" in section, slot
 
 
 def test_what_is_on_no_index_is_not_told_to_be_installed_from_one() -> None:

@@ -31,7 +31,7 @@ def without_code(text: str) -> str:
     """Return a page without its blocks of code, generated parts, headings and comments."""
     text = re.sub(r"^( *)```.*?^\1```$", "\n", text, flags=re.S | re.M)
     text = re.sub(r"<!--.*?-->", "", text, flags=re.S)
-    return re.sub(r"^(#|:::|!!!|\|[ :|-]+\|$| {4,}options:).*", "", text, flags=re.M)
+    return re.sub(r"^(#|!!!|\|[ :|-]+\|$).*", "", text, flags=re.M)
 
 
 def plain(text: str) -> str:

@@ -1,8 +1,8 @@
 """The words every layer uses: joint order, states, commands, images, objects.
 
 Units are SI and radians. `T_a_b` is a 4x4 homogeneous matrix that maps the coordinates of a point in frame b
-into frame a. Quaternions are wxyz. Frames follow REP-103 and REP-120: `base_link` is the pelvis link, x forward,
-z up; `odom` is the world-fixed frame that coincides with the levelled base_link at the start of an episode.
+into frame a. Quaternions are wxyz. Frames follow REP-103 and REP-120. `base_link` is the pelvis link, x forward,
+z up. `odom` is the world-fixed frame that coincides with the levelled base_link at the start of an episode.
 Optical frames have z forward, x right, y down.
 """
 

@@ -1,13 +1,13 @@
-"""The gait clock and the gate that decides between standing and stepping, for one robot or for many at once.
+"""The gait clock and the rule that decides between standing and stepping, for one robot or for many at once.
 
 Phases run from 0 to 1 per period, the right leg half a period behind the left. A leg is in stance while its phase is
 below `stance`, so both are in double support for a moment after phase 0 and after phase 0.5.
 
-While the robot stands the clock rests. It starts when a twist is commanded or, with `start: recovery` or `balance`,
-when the standing robot cannot keep its balance with its feet where they are: the capture point (CoM position plus
-velocity over the pendulum's frequency; Pratt et al., Humanoids 2006) has left the middle of the feet, or the feet are
-misplaced. It stops at a double support at which the twist is zero and both errors are small again, so that nobody
-stands on one leg; feet that are a little off do not keep it running for long, if the controller leaves them there.
+While the robot stands the clock rests. It starts when a twist is commanded. With `start: recovery` or `balance` it
+also starts when the robot cannot keep its balance where its feet are: the capture point has left their middle, or they
+are misplaced. That point is CoM position plus velocity over the pendulum's frequency (Pratt et al., Humanoids 2006).
+The clock stops at a double support, so that nobody stands on one leg, once the twist is zero and both errors are small.
+Feet that are a little off do not keep it running for long, if the controller leaves them there.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Detections to space: which depth inside a box is the object's, and its points in odom.
 
 A box holds object and background, and the mean of both is neither. What stands proud of its ground (a screw, a nut, a
-bus bar) is the nearest mode of the depths around the centre; what is flush (a hole's surroundings, a tray's floor) is
+bus bar) is the nearest mode of the depths around the centre. What is flush (a hole's surroundings, a tray's floor) is
 the greatest mode. Modes are taken in a window small enough that a surface seen at 45 degrees still is one.
 """
 
