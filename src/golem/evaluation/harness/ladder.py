@@ -10,7 +10,7 @@ from collections.abc import Generator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, field, make_dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, cast
+from typing import Annotated, Any, Literal, cast
 
 import tyro
 from tyro.conf import Suppress, arg
@@ -23,12 +23,15 @@ from golem.evaluation.harness.run_folder import RunFolder, read_costs
 from golem.evaluation.harness.trial_executor import make_executor
 from golem.evaluation.harness.trial_runner import Request, Runner
 from golem.evaluation.harness.trials import facts
+from golem.evaluation.metrics.sequential import StopRule, decisions, pairs_of, sequential_tables
 from golem.evaluation.metrics.summary import Summary, summarise
 from golem.evaluation.metrics.tables import all_cases, comparisons, losses, metrics, rates
-from golem.evaluation.metrics.text_table import TextTable
+from golem.evaluation.metrics.text_table import TextTable, short_names
 from golem.provenance import code_files, command_line, commit, versions
 
 OPEN = "(default: the rung's)"
+AHEAD = 32
+"""Trials of a method that are in flight on a cluster while it is open whether they are needed."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +63,17 @@ class LadderConfig:
     executor: str = "local"
     """Where trials run: local, or dask:ADDRESS of a scheduler whose workers have the same code."""
     limit: float = 600.0
-    """Wall-clock time after which a trial is ended and counts as lost [s]."""
+    """Time after which a trial is ended and counts as lost [s]: what it computes and sleeps, not what a busy machine
+    lets it wait."""
+    stop: Literal["never", "decided"] = "never"
+    """decided: end each comparison once it is, and a method alone once its rate is known to the margin; -n is then the
+    most. The tables say what holds at any time."""
+    margin: float = 0.1
+    """Methods whose success differs by less are equal [share of trials]."""
+    score: Annotated[str, arg(metavar="STR", help_behavior_hint="(default: success)")] = ""
+    """With --stop decided: compare this metric of a trial, a share between 0 and 1."""
+    comparisons: Annotated[int | None, arg(metavar="INT", help_behavior_hint="(default: those of this run)")] = None
+    """With --stop decided: among how many comparisons the error of 5 % is divided."""
     show: Annotated[str | None, arg(metavar="TRIAL", help_behavior_hint="")] = None
     """Run nothing but this trial, in the live view: INDEX, METHOD:INDEX, or its name in the report."""
     json: bool = False
@@ -87,6 +100,15 @@ class LadderConfig:
     def command(self) -> str:
         """Return the command line that runs this configuration."""
         return command_line("golem ladder", self.whole(), always=("rung", "seed"))
+
+    def rule(self, cases: int = 1) -> StopRule:
+        """Return by what comparisons are decided, on a rung with so many `cases`.
+
+        Raises:
+            ConfigError: an option of it cannot be.
+        """
+        own = max(1, len(self.method) * (len(self.method) - 1) // 2) * cases
+        return StopRule(self.margin, own if self.comparisons is None else self.comparisons, self.score)
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,8 +201,10 @@ def run_ladder(config: LadderConfig) -> LadderResult:
             raise LadderInterrupted(f"Stopped with {kept} trials kept; continue with: {command}") from None
         rung = request.rung
         cases = [] if rung.adaptive else [case_name(case) for case in rung.cases(lambda case: None)]
-        records = folder.finish(records, config.method, cases)
         wanted = {spec.key for spec in request.wanted({r.key: r.outcome for r in records})}
+        if request.stop is not None:  # trials that ran beyond a decision depend on -j
+            records = [r for r in records if r.key in wanted or r.method not in config.method]
+        records = folder.finish(records, config.method, cases)
         records = tuple(r for r in records if r.key in wanted)
         folder.state(command, provenance)
         print("Writing summary and report.", file=sys.stderr, flush=True)
@@ -199,7 +223,18 @@ def summed_up(config: LadderConfig, out: Path, records: tuple[TrialRecord, ...],
     """Return the figures of the `records` in the run folder `out`."""
     summary = summarise(records, config.method, read_costs(out), compared=not rung.adaptive)
     by_method = {method: [(r.spec, r.outcome) for r in records if r.method == method] for method in config.method}
-    return LadderResult(config, out, records, summary, tuple(rung.tables(by_method)), None)
+    own = list(rung.tables(by_method))
+    if config.stop == "decided":
+        rule, short = config.rule(len(summary.cases)), short_names(config.method)
+        rates = {
+            " ".join(filter(None, (short[m], case_name(case)))): rule.values(
+                [r for r in records if (r.method, r.case) == (m, case)]
+            )
+            for case in summary.cases
+            for m in config.method
+        }
+        own += sequential_tables(rates, decisions(pairs_of(records, config.method, rule), rule), rule)
+    return LadderResult(config, out, records, summary, tuple(own), None)
 
 
 def prepare(config: LadderConfig) -> tuple[Request, Provenance]:
@@ -229,7 +264,13 @@ def prepare(config: LadderConfig) -> tuple[Request, Provenance]:
         raise ConfigError(f"Rung {rung.name} times this machine: leave out -j and --executor.")
     resolved = {method: facts(rung, method, profile, overrides, options) for method in config.method}
     example = TrialSpec(rung.name, config.method[0], profile, config.seed, 0, overrides, options)
-    request = Request(rung, RUNGS[config.rung], config.method, n, example, config.limit)
+    stop = None
+    if config.stop == "decided":
+        if rung.adaptive:
+            raise ConfigError(f"Rung {rung.name} chooses its own cases: leave out --stop decided.")
+        stop = config.rule(len(rung.cases(lambda case: None)))
+    ahead = 2 * config.j if config.executor == "local" else AHEAD
+    request = Request(rung, RUNGS[config.rung], config.method, n, example, config.limit, stop, ahead)
     return request, Provenance(resolved, code_files(), commit(), versions())
 
 

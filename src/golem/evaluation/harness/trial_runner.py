@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import sys
 import time
@@ -19,6 +20,7 @@ from golem.evaluation.harness.records import Provenance, TrialRecord
 from golem.evaluation.harness.run_folder import Finished, RunFolder
 from golem.evaluation.harness.trial_executor import TrialExecutor
 from golem.evaluation.harness.trials import Batch, Died, Ending, Refused
+from golem.evaluation.metrics.sequential import StopRule
 from golem.provenance import Unchanged
 
 PERIOD = 30.0
@@ -91,7 +93,9 @@ class Request:
         methods: what is compared.
         n: trials per method and case.
         example: a trial, of which method, index and case are to be replaced.
-        limit: wall-clock time that a batch may take [s].
+        limit: time that a batch may take, see `LadderConfig` [s].
+        stop: by which comparisons are ended that are decided; None runs all `n`.
+        ahead: trials of a method that are asked for at once where the next may not be needed.
     """
 
     rung: Rung[Any]
@@ -100,6 +104,8 @@ class Request:
     n: int
     example: TrialSpec
     limit: float
+    stop: StopRule | None = None
+    ahead: int = 8
 
     def spec(self, method: str, index: int, case: Case) -> TrialSpec:
         """Return one trial."""
@@ -121,13 +127,32 @@ class Request:
             method: self.rung.cases(lambda case, method=method: self.results(method, case, found))
             for method in self.methods
         }
+        ends = {} if self.stop is None else self._ends(self.stop, asked, found)
         return [
             self.spec(method, index, cases[number])
             for index in range(self.n)
             for number in range(max(len(cases) for cases in asked.values()))
             for method, cases in asked.items()
-            if number < len(cases)
+            if number < len(cases) and index < ends.get((method, case_name(cases[number])), self.n)
         ]
+
+    def _ends(
+        self, stop: StopRule, asked: Mapping[str, Sequence[Case]], found: Mapping[Key, TrialOutcome]
+    ) -> dict[tuple[str, str], int]:
+        """Return how many trials each method is to have under each case, by its trials 0, 1, ... without a gap.
+
+        So it does not depend on the order in which trials finish.
+        """
+        ends: dict[tuple[str, str], int] = {}
+        for name in dict.fromkeys(case_name(case) for cases in asked.values() for case in cases):
+            there: dict[str, list[TrialOutcome]] = {}
+            for method, cases in asked.items():
+                if any(case_name(case) == name for case in cases):
+                    keys = itertools.takewhile(found.__contains__, ((method, name, i) for i in range(self.n)))
+                    there[method] = [found[key] for key in keys]
+            wanted = stop.ends({method: stop.values(trials) for method, trials in there.items()}, self.n, self.ahead)
+            ends |= {(method, name): end for method, end in wanted.items()}
+        return ends
 
 
 class Runner:
@@ -173,9 +198,12 @@ class Runner:
                     self._found[record.key] = record.outcome
                     progress.step(record.success)
                     self._explain(record, progress)
-                if self._request.rung.adaptive and self._request.complete(batch.specs, self._found):
+                stop = self._request.stop is not None
+                if stop or self._request.rung.adaptive and self._request.complete(batch.specs, self._found):
                     wanted = self._request.wanted(self._found)
                     progress.expect(len(wanted))
+                    if stop and all(spec.key in self._found for spec in wanted):
+                        break  # what still runs is beyond the decision
                     self._submit(wanted)
         return records
 

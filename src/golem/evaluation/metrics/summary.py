@@ -141,7 +141,7 @@ def summarise(
     """Return the figures of `records`.
 
     Args:
-        records: case by case the same indices for every method that has the case.
+        records: of the trials; methods are compared by those that both have.
         methods: their order.
         costs: lines of the run's `timings.jsonl`.
         compared: whether methods are compared pair by pair; not where an adaptive rung chose other cases for each.
@@ -155,14 +155,21 @@ def summarise(
         spent.setdefault((case_name(line["case"]), line["method"]), []).append(line)
     keys = [(name, method) for name in cases for method in methods if (name, method) in grouped]
     pairs = [
-        (grouped[name, a], grouped[name, b])
+        pair
         for name in cases
         for a, b in itertools.combinations(methods, 2)
-        if compared and (name, a) in grouped and (name, b) in grouped
+        if compared and all(pair := _common(grouped.get((name, a), ()), grouped.get((name, b), ())))
     ]
     rows = tuple(row(grouped[key], spent.get(key, [])) for key in keys)
     together = [pooled(method, records) for method in methods] if compared and len(cases) > 1 else []
     return Summary(rows, comparisons_of(pairs), tuple(one for one in together if one is not None))
+
+
+def _common(a: Sequence[TrialRecord], b: Sequence[TrialRecord]) -> tuple[list[TrialRecord], list[TrialRecord]]:
+    """Return those of the same indices, of which a run that ended early may have more with one method."""
+    both = {r.index for r in a} & {r.index for r in b}
+    one, other = ([r for r in side if r.index in both] for side in (a, b))
+    return one, other
 
 
 def pooled(method: str, records: Sequence[TrialRecord]) -> Pooled | None:

@@ -1,0 +1,208 @@
+"""When enough trials were run: the rule of `--stop decided`, and what may be said at any moment."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from golem.errors import ConfigError
+from golem.evaluation.base import Case, TrialOutcome, case_name
+from golem.evaluation.harness.records import TrialRecord
+from golem.evaluation.metrics.anytime import (
+    ALPHA,
+    anytime_interval,
+    anytime_p,
+    bounded_interval,
+    confidence_sequence,
+    difference_interval,
+    equal_within,
+    paired_evidence,
+)
+from golem.evaluation.metrics.statistics import Interval, holm, wilson
+from golem.evaluation.metrics.tables import p_value
+from golem.evaluation.metrics.text_table import TextTable, short_names
+from golem.types import Array
+
+
+@dataclass(frozen=True, slots=True)
+class StopRule:
+    """When a comparison is decided.
+
+    Attributes:
+        margin: methods that differ by less are equal [share of trials]; one method alone is known when its interval is
+            no wider than twice this.
+        comparisons: how many the error of 5 % is divided among.
+        score: name in `TrialOutcome.series` of a share from 0 to 1 that is compared; empty compares success.
+
+    Raises:
+        ConfigError: the margin is no share.
+    """
+
+    margin: float = 0.1
+    comparisons: int = 1
+    score: str = ""
+
+    def __post_init__(self) -> None:
+        """Check the margin."""
+        if not 0.0 < self.margin < 1.0:
+            raise ConfigError(f"--margin is {self.margin:g}; it is a share between 0 and 1, e.g. 0.1.")
+        if self.comparisons < 1:
+            raise ConfigError(f"--comparisons is {self.comparisons}; it must be 1 or more.")
+
+    def values(self, trials: Sequence[TrialOutcome] | Sequence[TrialRecord]) -> Array:
+        """Return what is compared of each trial, between 0 and 1.
+
+        Raises:
+            ConfigError: the score is no share.
+        """
+        found = np.array([t.series.get(self.score, 0.0) if self.score else float(t.success) for t in trials])
+        if len(found) and not (0.0 <= found.min() and found.max() <= 1.0):
+            raise ConfigError(f"The score '{self.score}' is not between 0 and 1 in every trial; name a share.")
+        return found
+
+    def decided_after(self, a: Array, b: Array | None = None) -> int | None:
+        """Return after how many trials of one method, or of two on the same scenes, it is decided; None if not yet."""
+        alpha = ALPHA / self.comparisons
+        if not len(a):
+            return None
+        if b is None:
+            low, high = confidence_sequence(a, alpha)
+            done = high - low <= 2.0 * self.margin
+        else:
+            done = (anytime_p(paired_evidence(a, b)) <= alpha) | equal_within(a, b, self.margin, alpha)
+        return int(np.argmax(done)) + 1 if done.any() else None
+
+    def ends(self, values: Mapping[str, Array], n: int, ahead: int) -> dict[str, int]:
+        """Return how many trials each method is to have, at most `n`.
+
+        Args:
+            values: method -> those of its trials 0, 1, ... without a gap.
+            n: planned number.
+            ahead: how many trials more than are there may be asked for where nothing is decided.
+        """
+        wanted = dict.fromkeys(values, 0)
+        for pair in itertools.combinations(values, 2) if len(values) > 1 else [tuple(values)]:
+            there = min(len(values[method]) for method in pair)
+            after = self.decided_after(*(values[method][:there] for method in pair)) if there else None
+            for method in pair:
+                wanted[method] = max(wanted[method], min(n, there + ahead) if after is None else after)
+        return wanted
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """Two sides on the same trials, as they stand.
+
+    Attributes:
+        a, b: the sides.
+        n: pairs.
+        difference: confidence sequence's interval of a minus b.
+        p: p-value that holds at any time.
+        p_holm: the same, adjusted for all comparisons.
+        after: pairs after which it was decided; None if it is not.
+    """
+
+    a: str
+    b: str
+    n: int
+    difference: Interval
+    p: float
+    p_holm: float
+    after: int | None
+
+
+Pair = tuple[str, str, Array, Array]
+"""Names of two sides, and what is compared of their trials, in the order of the indices they have in common."""
+
+
+def decisions(pairs: Sequence[Pair], rule: StopRule) -> tuple[Decision, ...]:
+    """Return what is known of each pair, with Holm's adjustment over all."""
+    ps = [float(anytime_p(paired_evidence(a, b))[-1]) for *_, a, b in pairs]
+    return tuple(
+        Decision(one, other, len(a), difference_interval(a, b), p, adjusted, rule.decided_after(a, b))
+        for (one, other, a, b), p, adjusted in zip(pairs, ps, holm(ps), strict=True)
+    )
+
+
+def pairs_of(records: Sequence[TrialRecord], methods: Sequence[str], rule: StopRule) -> list[Pair]:
+    """Return every pair of methods, case by case, over the trials that both have."""
+    cases: dict[str, Case] = {case_name(r.case): r.case for r in records}
+    found: list[Pair] = []
+    for case in cases:
+        sides = {m: {r.index: r for r in records if r.method == m and case_name(r.case) == case} for m in methods}
+        for a, b in itertools.combinations(methods, 2):
+            pair = pair_of(f"{a}, {case}" if case else a, sides[a], f"{b}, {case}" if case else b, sides[b], rule)
+            found += [pair] if pair else []
+    return found
+
+
+def pair_of(
+    one: str, a: Mapping[int, TrialRecord], other: str, b: Mapping[int, TrialRecord], rule: StopRule
+) -> Pair | None:
+    """Return the trials that two sides have in common; None where there is none."""
+    both = sorted(a.keys() & b.keys())
+    return (one, other, rule.values([a[i] for i in both]), rule.values([b[i] for i in both])) if both else None
+
+
+def sequential_tables(rates: Mapping[str, Array], found: Sequence[Decision], rule: StopRule) -> list[TextTable]:
+    """Return what holds at any time, beside what holds for a number that was fixed.
+
+    Args:
+        rates: name of a row -> what was measured of its trials.
+        found: comparisons.
+        rule: by which trials were ended.
+    """
+    rows = [
+        (name, str(len(x)), f"{100 * float(x.mean()):.1f}", _fixed(x).text(100.0), anytime_interval(x).text(100.0))
+        for name, x in rates.items()
+        if len(x)
+    ]
+    tables = [
+        TextTable(
+            f"{rule.score.replace('_', ' ').capitalize() or 'Success'} at any time",
+            ("method", "n", "mean [%]", "95 %, n fixed in advance", "95 %, at any time"),
+            tuple(rows),
+            "At any time: betting confidence sequence (Waudby-Smith and Ramdas 2024), valid wherever a run stopped.",
+        )
+    ]
+    if found:
+        short = short_names(name for d in found for name in (d.a, d.b))
+        lines = [
+            (
+                f"{short[d.a]} against {short[d.b]}",
+                str(d.n),
+                d.difference.text(100.0, "+"),
+                p_value(d.p),
+                p_value(d.p_holm),
+                _verdict(d, rule),
+            )
+            for d in found
+        ]
+        tables.append(
+            TextTable(
+                "Comparison at any time",
+                ("pair", "pairs", "difference [points]", "p", "Holm-adjusted p", "verdict"),
+                tuple(lines),
+                f"By e-processes, valid after every trial; equal: within {100 * rule.margin:g} points.",
+            )
+        )
+    return tables
+
+
+def _fixed(x: Array) -> Interval:
+    if np.isin(x, (0.0, 1.0)).all():
+        return wilson(float(x.sum()), len(x))
+    return bounded_interval(x)
+
+
+def _verdict(d: Decision, rule: StopRule) -> str:
+    if d.p_holm <= ALPHA:
+        verdict = f"{'first' if d.difference.low + d.difference.high > 0.0 else 'second'} is better"
+    elif -rule.margin <= d.difference.low and d.difference.high <= rule.margin:
+        verdict = "equal"
+    else:
+        return "open"
+    return verdict if d.after is None else f"{verdict}, known after {d.after}"
