@@ -18,7 +18,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from golem.errors import OutputError
+from golem.errors import ConfigError, OutputError
 from golem.evaluation.base import TrialOutcome, TrialSpec, case_name
 from golem.evaluation.harness.records import Provenance, TrialRecord, artefacts, read_records, whole_lines
 from golem.output_file import write_file
@@ -189,6 +189,32 @@ class RunFolder:
     def write_text(self, name: str, text: str) -> Path:
         """Write a file of the folder, whole or not at all, and return its path."""
         return write_file(self.path / name, text)
+
+
+def finished_records(folder: Path) -> list[TrialRecord]:
+    """Return the trials of a run folder that nobody writes to, at least one.
+
+    Raises:
+        golem.errors.OutputError: a run writes to it, or ended while it wrote, or a line is no trial record.
+        ConfigError: it holds no trials.
+    """
+    trials = folder / "trials.jsonl"
+    if not trials.is_file():
+        raise ConfigError(f"{folder} holds no trials; give the --out folder of a golem ladder or a golem study.")
+    held = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(held, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except OSError as error:
+        raise OutputError(f"Another run is writing to {folder}; wait for it.") from error
+    finally:
+        os.close(held)
+    text = trials.read_bytes()
+    if whole_lines(text) < len(text):
+        raise OutputError(f"The last line of {trials} is half-written; give its command again to continue the run.")
+    records = read_records(trials)
+    if not records:
+        raise ConfigError(f"{folder} holds no trials; give the --out folder of a golem ladder or a golem study.")
+    return records
 
 
 def read_facts(folder: Path) -> dict[str, Any]:

@@ -9,7 +9,8 @@ from pathlib import Path
 from tyro.conf import Positional
 
 from golem.errors import ConfigError
-from golem.evaluation.harness.records import TrialRecord, read_records
+from golem.evaluation.harness.records import TrialRecord
+from golem.evaluation.harness.run_folder import finished_records
 from golem.evaluation.metrics.summary import Summary, comparisons_of, row
 from golem.evaluation.metrics.tables import run_tables
 
@@ -38,7 +39,7 @@ def run_compare(config: CompareConfig) -> Summary:
     """
     if config.first.resolve() == config.second.resolve():
         raise ConfigError(f"Both are {config.first}; name two run folders.")
-    a, b = (_read(folder) for folder in (config.first, config.second))
+    a, b = (finished_records(folder) for folder in (config.first, config.second))
     rungs = f"The runs are of two rungs, {a[0].rung} and {b[0].rung}, and" if a[0].rung != b[0].rung else "The runs"
     for name in ("seed", "profile"):
         one, other = getattr(a[0], name), getattr(b[0], name)
@@ -70,13 +71,6 @@ def run_compare(config: CompareConfig) -> Summary:
 def _named(side: Mapping[Key, TrialRecord], keys: Sequence[Key], name: str) -> list[TrialRecord]:
     """Return records whose method says which run they are of."""
     return [replace(side[key], method=f"{key[0]} on {name}") for key in keys]
-
-
-def _read(folder: Path) -> list[TrialRecord]:
-    records = read_records(folder / "trials.jsonl")
-    if not records:
-        raise ConfigError(f"{folder} holds no trials; give the --out folder of a finished golem ladder.")
-    return records
 
 
 def _differences(a: TrialRecord, b: TrialRecord) -> list[str]:

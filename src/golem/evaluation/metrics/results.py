@@ -15,7 +15,7 @@ from tyro.conf import Positional
 from golem.errors import ConfigError
 from golem.evaluation.base import RUNGS, make_rung
 from golem.evaluation.harness.records import TrialRecord, read_records
-from golem.evaluation.harness.run_folder import read_costs, read_facts
+from golem.evaluation.harness.run_folder import finished_records, read_costs, read_facts
 from golem.evaluation.metrics.summary import summarise
 from golem.evaluation.metrics.tables import run_tables
 from golem.output_file import write_file
@@ -95,7 +95,7 @@ def run_results(config: ResultsConfig) -> str:
     if not config.runs:
         raise ConfigError("Name at least one run folder.")
     if config.format == "csv":
-        text = trials_csv([record for folder in config.runs for record in _records(folder)])
+        text = trials_csv([record for folder in config.runs for record in finished_records(folder)])
     else:
         parts = [section(folder, config.format == "latex") for folder in config.runs]
         total = sum((gate_hours(folder) for folder in config.runs), GateHours())
@@ -110,7 +110,7 @@ def run_results(config: ResultsConfig) -> str:
         from golem.evaluation.report.ladder_report import standalone_figures
 
         for folder in config.runs:
-            for name, picture in standalone_figures(_records(folder)).items():
+            for name, picture in standalone_figures(finished_records(folder)).items():
                 write_file(config.figures / f"{folder.resolve().name}-{name}.svg", picture)
     return text
 
@@ -130,20 +130,13 @@ def trials_csv(records: Sequence[TrialRecord]) -> str:
     return stream.getvalue()
 
 
-def _records(folder: Path) -> list[TrialRecord]:
-    records = read_records(folder / "trials.jsonl")
-    if not records:
-        raise ConfigError(f"{folder} holds no trials; give the --out folder of a finished golem ladder.")
-    return records
-
-
 def section(folder: Path, latex: bool = False) -> str:
     """Return the Markdown of one run folder, or its LaTeX, in which all but the tables is a comment.
 
     Raises:
         ConfigError, OutputError: see `run_results`.
     """
-    records = _records(folder)
+    records = finished_records(folder)
     commits = list(dict.fromkeys(record.commit for record in records))
     if len(commits) > 1:
         raise ConfigError(f"{folder} holds trials of {len(commits)} commits, {', '.join(commits)}; measure again.")

@@ -119,11 +119,12 @@ Pair = tuple[str, str, Array, Array]
 
 
 def decisions(pairs: Sequence[Pair], rule: StopRule) -> tuple[Decision, ...]:
-    """Return what is known of each pair, with Holm's adjustment over all."""
+    """Return what is known of each pair, with Holm's adjustment over all, and over those of the rule still to come."""
     ps = [float(anytime_p(paired_evidence(a, b))[-1]) for *_, a, b in pairs]
+    adjusted_ps = holm([*ps, *[1.0] * (rule.comparisons - len(ps))])
     return tuple(
         Decision(one, other, len(a), difference_interval(a, b), p, adjusted, rule.decided_after(a, b))
-        for (one, other, a, b), p, adjusted in zip(pairs, ps, holm(ps), strict=True)
+        for (one, other, a, b), p, adjusted in zip(pairs, ps, adjusted_ps, strict=False)
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+from functools import cache
 from importlib import resources
 from typing import Any
 
@@ -18,14 +19,23 @@ def render_page(template: str, facts: dict[str, str], **values: Any) -> str:
     Raises:
         MissingExtra: jinja2 is not installed.
     """
+    return _pages().get_template(template).render(css=style(), facts=facts, **values)
+
+
+@cache
+def style() -> str:
+    """Return the style sheet of every page."""
+    return resources.files("golem.evaluation.report").joinpath("report.css").read_text(encoding="utf-8")
+
+
+@cache
+def _pages() -> Any:
     try:
         from jinja2 import Environment, PackageLoader, StrictUndefined
     except ImportError as error:
         raise MissingExtra("jinja2", "report") from error
-    css = resources.files("golem.evaluation.report").joinpath("report.css").read_text(encoding="utf-8")
     loader = PackageLoader("golem.evaluation.report")
-    pages = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
-    return pages.get_template(template).render(css=css, facts=facts, **values)
+    return Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
 
 
 WIDTH = 900.0

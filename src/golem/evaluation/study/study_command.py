@@ -1,0 +1,200 @@
+"""`golem study`: every ladder of a study file into one folder, resumable; its plan; and its tables in documents."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import Positional, arg
+
+from golem.errors import ConfigError, MissingExtra, OutputError
+from golem.evaluation.base import rung_class
+from golem.evaluation.harness.ladder import prepare, run_ladder
+from golem.evaluation.harness.run_folder import RunFolder
+from golem.evaluation.metrics.anytime import ALPHA
+from golem.evaluation.metrics.results import trials_csv
+from golem.evaluation.metrics.sequential import decisions
+from golem.evaluation.study.plan import plan_table
+from golem.evaluation.study.study_file import Cell, StudyFile, read_study_file
+from golem.evaluation.study.study_folder import FACTS, Study, read_study, refuse_mixed
+from golem.output_file import write_file
+from golem.provenance import code_files, command_line, commit, digest
+
+BEST = 2
+"""So many methods of a cell go on to `best_n`."""
+_BLOCK = re.compile(r"(<!-- study: (\S+) -->\n).*?(<!-- /study -->)", re.S)
+
+
+@dataclass(frozen=True)
+class StudyConfig:
+    """Run every ladder of a study file into one folder; the same command continues it. Or write its tables.
+
+    The folder gets a ladder's folder per cell, study.md, study.html, and trials.csv.
+    """
+
+    paths: Positional[tuple[Path, ...]]
+    """The study file. With --tables: the folder that holds studies by name, then the Markdown files to write to."""
+    out: Annotated[Path | None, arg(metavar="PATH", help_behavior_hint="(default: runs/studies/NAME)")] = None
+    """Folder for the results."""
+    n: Annotated[int | None, arg(aliases=("-n",), metavar="INT", help_behavior_hint="(default: the file's)")] = None
+    """Trials per method in every cell, e.g. 1 to see whether everything runs."""
+    j: Annotated[int, arg(aliases=("-j",))] = 1
+    """Processes that run trials at the same time."""
+    executor: str = "local"
+    """Where trials run: local, or dask:ADDRESS."""
+    limit: float = 600.0
+    """Time after which a trial is ended, see golem ladder [s]."""
+    plan: bool = False
+    """Instead, say how many trials and hours it takes here, and what differences it can find."""
+    tables: bool = False
+    """Instead, write the tables of studies between `<!-- study: NAME -->` and `<!-- /study -->` in documents."""
+
+    def command(self) -> str:
+        """Return the command line that runs this."""
+        words = command_line("golem study", replace(self, paths=(), plan=False))
+        return words.replace("--paths", self.paths[0].as_posix(), 1)
+
+
+def run_study_command(config: StudyConfig) -> Study | None:
+    """Run, plan, or write tables.
+
+    Raises:
+        ConfigError: an option, the file, or what a folder holds says what cannot be.
+        golem.errors.GolemError: see `run_ladder`.
+    """
+    if config.tables:
+        write_tables(config.paths)
+        return None
+    if len(config.paths) != 1:
+        raise ConfigError(
+            f"golem study takes one study file, not {len(config.paths)}; with --tables, a folder and pages."
+        )
+    path = config.paths[0]
+    study, cells = read_study_file(path)
+    out = config.out or Path("runs/studies") / path.stem
+    cells = tuple(_placed(cell, config, out) for cell in cells)
+    for cell in cells:
+        try:
+            prepare(cell.config)
+        except ConfigError as error:
+            raise ConfigError(f"{path}, cell '{cell.name}': {error}") from error
+    if config.plan:
+        print(plan_table(study, cells, family(study, cells)).terminal(120))
+        return None
+    with RunFolder(out):
+        return run_cells(config, study, cells, out)
+
+
+def run_cells(config: StudyConfig, study: StudyFile, cells: Sequence[Cell], out: Path) -> Study:
+    """Run what is not there yet, and write the report."""
+    comparisons = family(study, cells)
+    _state(config, study, cells, out, comparisons)
+    rejected = 0
+    for cell in cells:
+        print(f"Cell {cell.name}: {', '.join(cell.config.method)}", flush=True)
+        # What is refuted already leaves its share of the error to the others (Holm, step by step).
+        ladder = replace(cell.config, comparisons=max(1, comparisons - rejected) if study.stop == "decided" else None)
+        result = run_ladder(ladder)
+        if cell.best_n is not None and cell.best_n > (ladder.n or 0):
+            best = sorted(result.summary.rows, key=lambda row: -row.rate)[:BEST]
+            chosen = {row.method for row in best}
+            methods = tuple(m for m in ladder.method if m in chosen)
+            run_ladder(replace(ladder, method=methods, n=cell.best_n))
+        if study.stop == "decided":
+            found = read_study(out)
+            rejected = sum(d.p_holm <= ALPHA for d in decisions(found.pairs(), found.rule))
+    found = read_study(out)
+    tables = "\n\n".join(table.markdown() for table in found.comparisons())
+    write_file(out / "study.md", f"# {found.title}\n\n{found.about}\n\n{found.markdown()}\n\n{tables}\n")
+    write_file(out / "trials.csv", trials_csv([r for cell in found.cells for r in cell.records]))
+    print(found.rates().terminal(120))
+    try:
+        from golem.evaluation.report.site import study_page
+
+        print(f"Report: {write_file(out / 'study.html', study_page(found))}")
+    except MissingExtra as missing:
+        print(f"No page was written: {missing}")
+    return found
+
+
+def family(study: StudyFile, cells: Sequence[Cell]) -> int:
+    """Return how many comparisons a study makes: what Holm's adjustment is over."""
+    count = 0
+    for cell in cells:
+        m, rung = len(cell.config.method), prepare(cell.config)[0].rung
+        if not rung.adaptive:
+            count += m * (m - 1) // 2 * len(rung.cases(lambda case: None))
+    methods = {cell.name: set(cell.config.method) for cell in cells}
+    return max(1, count + sum(len(methods[a] & methods[b]) for a, b in study.compare))
+
+
+def _placed(cell: Cell, config: StudyConfig, out: Path) -> Cell:
+    c = cell.config
+    timed = rung_class(c.rung).timed
+    ladder = replace(
+        c, n=config.n or c.n, out=out / cell.name, limit=config.limit,
+        j=1 if timed else config.j, executor="local" if timed else config.executor,
+    )  # fmt: skip
+    return replace(cell, config=ladder, best_n=None if config.n else cell.best_n)
+
+
+def _state(config: StudyConfig, study: StudyFile, cells: Sequence[Cell], out: Path, comparisons: int) -> None:
+    """Write what the folder is of; refuse one of another study or of other code."""
+    code = digest(code_files())
+    try:
+        before = json.loads((out / FACTS).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        before = {}
+    if before.get("code", code) != code:
+        raise OutputError(
+            f"{out} is of other code, commit {before['commit']}; this is {commit()}. A study is of one state: choose "
+            "another --out."
+        )
+    facts = {
+        "name": config.paths[0].stem,
+        "title": study.title,
+        "about": study.about,
+        "by_construction": study.by_construction,
+        "command": config.command(),
+        "commit": commit(),
+        "code": code,
+        "stop": study.stop,
+        "margin": study.margin,
+        "score": study.score,
+        "comparisons": comparisons,
+        "compare": [list(pair) for pair in study.compare],
+        "cells": {cell.name: cell.config.n for cell in cells},
+    }
+    write_file(out / FACTS, json.dumps(facts, indent=1) + "\n")
+
+
+def write_tables(paths: Sequence[Path]) -> None:
+    """Write the tables of the studies in the first of `paths` into the documents that follow.
+
+    Raises:
+        ConfigError: a document names no study, or one that is not there, or studies of different code.
+        OutputError: a document cannot be read or written.
+    """
+    if len(paths) < 2:
+        raise ConfigError("golem study --tables needs a folder of studies and at least one Markdown file.")
+    for page in paths[1:]:
+        _write_tables(paths[0], page)
+
+
+def _write_tables(folder: Path, page: Path) -> None:
+    try:
+        text = page.read_text(encoding="utf-8")
+    except (OSError, ValueError) as error:
+        raise OutputError(f"Cannot read {page}: {error}.") from error
+    names = [match[2] for match in _BLOCK.finditer(text)]
+    if not names or text.count("<!-- study:") != len(names):
+        raise ConfigError(f"{page} needs lines '<!-- study: NAME -->', each with a line '<!-- /study -->' after it.")
+    studies = {name: read_study(folder / name) for name in names}
+    refuse_mixed(list(studies.values()))
+    found = _BLOCK.sub(lambda match: f"{match[1]}{studies[match[2]].markdown()}\n{match[3]}", text)
+    write_file(page, found)
+    print(f"{page}: {', '.join(studies)}")
