@@ -254,8 +254,6 @@ COMMANDS: dict[str, Callable[[list[str]], int]] = {
                         "golem.evaluation.report.site", "PublishConfig:run_publish", True),
     "results": _command("Write the tables of run folders as Markdown, as they stand in the documentation.",
                         "golem.evaluation.metrics.results", "ResultsConfig:run_results"),
-    "table": _command("Make the paper's table of grasps: every method, screw and fridge, hanging and standing.",
-                      "golem.evaluation.harness.grasp_table", "TableConfig:run_table", True),
     "model": _model,
     "bench": _bench,
     "reach": _command("Show where the hands can be: table, picture, and the map that skills ask.",
