@@ -1,107 +1,23 @@
-"""Worker processes here: one thread each, deaf to Ctrl-C, gone with their parent, replaced when they die.
-
-The process in which trials run: `python -m golem.evaluation.harness.local_executor FD REPORT_FD`.
-
-It gets batches over a socket and answers each with how it ended. It is in a session of its own, so that no Ctrl-C
-reaches it; the death of its parent ends it with all that it started, and so does a batch that takes too long.
-"""
+"""Worker processes here: one thread each, deaf to Ctrl-C, gone with their parent, replaced when they die."""
 
 from __future__ import annotations
 
-import faulthandler
-import gc
 import os
-import queue
 import signal
 import socket
 import subprocess
 import sys
 import tempfile
-import threading
 import time
 from collections import deque
 from collections.abc import Generator
 from contextlib import suppress
 from multiprocessing.connection import Connection, wait
-from types import FrameType
 
 from golem.evaluation.harness.copies import CAN_COPY
-from golem.evaluation.harness.trials import Batch, Died, Ending, Overdue, culprit_at, run_batch, rung_of
-
-STARTED = "started"
-"""What is answered when a batch begins; its ending follows."""
-LATE = 2.0
-"""Time after a batch's limit at which the interpreter writes where native code hangs [s], which lets no Python run."""
-
-
-class Watchdog:
-    """Tells the parent what hangs, and ends this process, when a batch outlasts its limit."""
-
-    def __init__(self, connection: Connection, report: int) -> None:
-        """Tell it over `connection`, or write it to the file `report` where native code keeps Python from running."""
-        self._connection, self._report = connection, report
-        self._answering = threading.Lock()
-        self._main = threading.main_thread().ident
-
-    def run(self, batch: Batch) -> None:
-        """Run `batch` and answer it; its time counts from when the rung is loaded."""
-        with suppress(Exception):  # `run_batch` meets it again
-            rung_of(batch)
-        self._connection.send(STARTED)
-        over = threading.Event()
-        watch = threading.Thread(target=self._watch, args=(batch.limit, over), daemon=True)
-        os.ftruncate(self._report, 0)
-        os.lseek(self._report, 0, os.SEEK_SET)
-        faulthandler.dump_traceback_later(batch.limit + LATE, file=self._report)
-        watch.start()
-        ending = run_batch(batch)
-        faulthandler.cancel_dump_traceback_later()
-        with self._answering:
-            over.set()
-            self._connection.send(ending)
-        watch.join()
-        gc.collect()  # modules of a stack refer to each other, and keep their robot
-
-    def _watch(self, limit: float, over: threading.Event) -> None:
-        if over.wait(limit):
-            return
-        with self._answering:
-            frame: FrameType | None = sys._current_frames().get(self._main or 0)
-            if over.is_set() or frame is None:
-                return
-            by = culprit_at(frame)
-            self._connection.send(Overdue(by.module, by.place, by.trace))
-            _end()
-
-
-def _end() -> None:
-    """End this process and all that it started."""
-    os.killpg(0, signal.SIGKILL)
-
-
-def _listen(connection: Connection, batches: queue.SimpleQueue[Batch]) -> None:
-    """Hand over what comes in; the end of the parent ends this process."""
-    try:
-        while True:
-            batches.put(connection.recv())
-    except (EOFError, OSError):
-        _end()
-
-
-def main(connection: Connection, report: int) -> None:
-    """Answer batches until the parent is gone."""
-    sys.path[:] = connection.recv()
-    faulthandler.enable(file=report)
-    batches: queue.SimpleQueue[Batch] = queue.SimpleQueue()
-    threading.Thread(target=_listen, args=(connection, batches), daemon=True).start()
-    watchdog = Watchdog(connection, report)
-    while True:
-        watchdog.run(batches.get())
-
-
-if __name__ == "__main__":
-    main(Connection(int(sys.argv[1])), int(sys.argv[2]))
-
+from golem.evaluation.harness.own_time import OwnTime
+from golem.evaluation.harness.trials import Batch, Died, Ending, Overdue
+from golem.evaluation.harness.worker import DUMP, OVER, STARTED
 
 SINGLE_THREAD = {
     name: "1"
@@ -118,9 +34,11 @@ SINGLE_THREAD = {
 """Environment of a worker: one thread each, the software renderer's too, so that `-j` alone sets the load and sums are
 in one order; and one heap."""
 START = 300.0
-"""Time in which a process has to have begun its batch [s]."""
+"""Own time in which a process has to have begun its batch [s]."""
 GRACE = 5.0
-"""Time after a batch's limit that its process gets to say where it hangs [s]."""
+"""Own time after a batch's limit that its process gets to say where it hangs; then the interpreter gets as much [s]."""
+PERIOD = 5.0
+"""Time between two looks at what a process has taken [s]."""
 REPORT = 20_000
 """Length of what is read of such a report [bytes]."""
 
@@ -145,7 +63,7 @@ class LocalExecutor:
             busy = [worker for worker in self._workers if worker.batch is not None]
             if not busy:
                 return
-            soonest = min(worker.deadline for worker in busy) - time.monotonic()
+            soonest = min(worker.due for worker in busy) - time.monotonic()
             ready = set(wait([x for worker in busy for x in worker.signs], timeout=max(0.0, soonest)))
             for worker in busy:
                 ending = worker.look(not ready.isdisjoint(worker.signs))
@@ -178,19 +96,19 @@ class _Worker:
 
     Attributes:
         batch: what it runs; None while it is idle.
-        deadline: when it must have answered, on the clock `time.monotonic` [s].
+        due: when it is to be looked at again, on the clock `time.monotonic` [s].
         signs: what becomes readable when it has answered or died.
         ended: whether it is no more.
     """
 
     def __init__(self) -> None:
         self.batch: Batch | None = None
-        self.deadline = 0.0
+        self.due = 0.0
         self.ended = False
         self._report = tempfile.TemporaryFile()
         ours, its = socket.socketpair()
         with its:
-            command = [sys.executable, "-P", "-m", "golem.evaluation.harness.local_executor"]
+            command = [sys.executable, "-P", "-m", "golem.evaluation.harness.worker"]
             self._process = subprocess.Popen(
                 [*command, str(its.fileno()), str(self._report.fileno())],
                 env={**os.environ, **SINGLE_THREAD},
@@ -208,7 +126,7 @@ class _Worker:
     def give(self, batch: Batch) -> None:
         """Let it run `batch`."""
         self.batch = batch
-        self.deadline = time.monotonic() + START
+        self._count(START)
         with suppress(OSError):
             self._connection.send(batch)
 
@@ -220,13 +138,13 @@ class _Worker:
 
     def look(self, answered: bool) -> Ending | None:
         """Return how its batch ended, None where it goes on; where it is overdue or died, the process is ended."""
-        overdue = not answered and time.monotonic() > self.deadline
+        overdue = not answered and self._overdue()
         ending: Ending | None = Overdue() if overdue else Died("") if answered else None
         with suppress(EOFError, OSError):
             if answered and self._connection.poll():
                 ending = self._connection.recv()
         if ending == STARTED and self.batch is not None:
-            self.deadline = time.monotonic() + self.batch.limit + GRACE
+            self._count(self.batch.limit)
             return None
         if isinstance(ending, Died | Overdue):
             if not overdue:
@@ -239,6 +157,29 @@ class _Worker:
             elif isinstance(ending, Died) and not ending.how:
                 ending = Died(_how(self._process.returncode), trace)
         return ending
+
+    def _count(self, limit: float) -> None:
+        """Begin to count what it takes, of which it may take `limit` [s]."""
+        self._own, self._limit, self._warned = OwnTime(self._process.pid), limit, 0
+        self.due = time.monotonic() + min(limit, PERIOD)
+
+    def _overdue(self) -> bool:
+        """Return whether it took too long, and has been told so in vain: first it, then its interpreter."""
+        if time.monotonic() < self.due:
+            return False
+        left = self._limit - self._own.used()
+        if left <= 0.0:
+            self._warned += 1
+            with suppress(OSError):
+                if self._warned == 1:
+                    self._connection.send(OVER)
+                elif self._warned == 2:
+                    os.kill(self._process.pid, DUMP)
+                else:
+                    return True
+            self._limit, left = self._limit + GRACE, left + GRACE
+        self.due = time.monotonic() + min(max(left, 0.01), PERIOD)
+        return False
 
     def kill(self) -> None:
         """End it and all that it started."""

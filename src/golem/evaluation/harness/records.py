@@ -1,6 +1,6 @@
 """Trial records: one JSON line per trial. It holds what the trial determined and nothing that depends on the machine.
 
-The same seed gives the same bytes, but for a trial that outlasted the limit of wall-clock time or whose process died.
+The same seed gives the same bytes, but for a trial that outlasted its limit or whose process died.
 """
 
 from __future__ import annotations

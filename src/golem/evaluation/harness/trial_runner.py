@@ -78,7 +78,7 @@ ATTEMPTS = 3
 CRASH = "crash"
 """Stage of a trial whose process died."""
 TIMEOUT = "timeout"
-"""Stage of a trial that outlasted the limit of wall-clock time."""
+"""Stage of a trial that outlasted its limit."""
 Key = tuple[str, str, int]
 """Method, name of the case, and index of a trial."""
 
@@ -238,7 +238,7 @@ class Runner:
             outcome = TrialOutcome(False, CRASH, None, detail, trace=ending.trace)
         else:
             place = f", in {ending.place}" if ending.place else ""
-            detail = f"It took longer than {batch.limit:g} s by the clock (--limit){place}."
+            detail = f"It took longer than {batch.limit:g} s of computing and sleeping (--limit){place}."
             outcome = TrialOutcome(False, TIMEOUT, ending.module, detail, trace=ending.trace)
         return ((spec, Finished(outcome, batch.limit, 0.0)),)
 

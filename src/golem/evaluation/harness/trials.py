@@ -75,7 +75,7 @@ class Batch:
     Attributes:
         target: `module:Class` of the rung.
         specs: the trials, at least one, of the same rung, options and profile.
-        limit: wall-clock time that the batch may take [s].
+        limit: own time that the batch may take, see `OwnTime` [s].
         configs: method -> hash of the configuration that the trial is meant to be of.
         code, versions: of the package where the run was started; a worker that has another refuses.
     """
