@@ -12,6 +12,7 @@ import sys
 import warnings
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, TypeVar
 
 import tyro
@@ -76,6 +77,21 @@ def _ladder(words: list[str]) -> int:
     if config.json:
         print(result.summary.json())
     return 0
+
+
+def _blame(words: list[str]) -> int:
+    """Say which modules lost the trials of a ladder run: they are run again with modules exchanged for truth."""
+    _prepare_graphics()
+    from golem.evaluation.blame.blame_command import BlameConfig, run_blame
+
+    if any(word.partition("=")[0] == "--rung" for word in words):
+        from golem.evaluation.harness.ladder import read_ladder, run_ladder
+
+        ladder = run_ladder(read_ladder(words)).config
+        config = BlameConfig((ladder.out or Path(),), j=ladder.j, executor=ladder.executor, limit=ladder.limit)
+    else:
+        config = _parse(BlameConfig, "blame", words)
+    return _exit_code(run_blame(config))
 
 
 def _faults(words: list[str]) -> int:
@@ -252,6 +268,7 @@ COMMANDS: dict[str, Callable[[list[str]], int]] = {
                       "golem.evaluation.study.study_command", "StudyConfig:run_study_command", True),
     "publish": _command("Write a static site from studies: leaderboards, methods, every trial, the data.",
                         "golem.evaluation.report.site", "PublishConfig:run_publish", True),
+    "blame": _blame,
     "results": _command("Write the tables of run folders as Markdown, as they stand in the documentation.",
                         "golem.evaluation.metrics.results", "ResultsConfig:run_results"),
     "model": _model,

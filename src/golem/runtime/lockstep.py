@@ -13,7 +13,6 @@ from golem import registry
 from golem.capabilities.arms.postures import POSTURES
 from golem.capabilities.legs.base import Envelope
 from golem.capabilities.legs.hold import STANCES
-from golem.capabilities.perception.base import Localizer
 from golem.errors import ConfigError, ModuleFault, RobotGone
 from golem.hardware.estop.estop_config import VirtualEstop
 from golem.hardware.safety.base import OperatorRequest, SafetyLimits
@@ -45,16 +44,13 @@ class LockstepRunner:
         estop: the virtual emergency stop, to be pressed.
     """
 
-    def __init__(
-        self, stack: Stack, robot: Robot, limits: SafetyLimits | None = None, localizer: Localizer | None = None
-    ) -> None:
+    def __init__(self, stack: Stack, robot: Robot, limits: SafetyLimits | None = None) -> None:
         """Wire the modules of `stack` to `robot`.
 
         Args:
             stack: what to run.
             robot: its robot.
             limits: what the safety gate enforces instead of the stack's profile: for studies of the gate.
-            localizer: what sees instead of the stack's own: for studies of what perception costs.
 
         Raises:
             ConfigError: a name or an option of the stack is wrong.
@@ -81,15 +77,8 @@ class LockstepRunner:
             limits = limits.still()
         standing = StandingLegs if stack.on_ground else None
         self._safety = SafetyNodes(self.bus, limits, self.estop, standing)
-        self._stack = StackNodes(
-            self.bus,
-            stack,
-            calibration.merged(robot.calibration),
-            calibration.mount,
-            gantry,
-            LATENCY,
-            localizer=localizer,
-        )
+        cameras = calibration.merged(robot.calibration)
+        self._stack = StackNodes(self.bus, stack, cameras, calibration.mount, gantry, LATENCY)
         ordered = in_order(self._robot.nodes + self._safety.nodes + self._stack.nodes)
         self.executor = Executor(self.bus, ordered, chain=chain_of(self.bus, ordered))
         self.request(OperatorRequest.ACTIVATE)

@@ -14,7 +14,6 @@ from typing import Any
 
 from golem import registry
 from golem.capabilities.legs.base import Envelope
-from golem.capabilities.perception.base import Localizer
 from golem.errors import GolemError
 from golem.hardware.estop.base import EmergencyStop
 from golem.hardware.safety.base import OperatorRequest, SafetyLimits
@@ -183,7 +182,6 @@ class StackNodes:
         pools: Mapping[str, ThreadPoolExecutor] | None = None,
         real: bool = False,
         epoch: float = 0.0,
-        localizer: Localizer | None = None,
     ) -> None:
         """Build the modules of `stack` around `bus`.
 
@@ -197,7 +195,6 @@ class StackNodes:
             pools: where the modules of the slots `POOLED` run; None is on the clock, see `LocalizerNode`.
             real: whether the robot is none of ours: no module can then call its on-board controller.
             epoch: when the robot's clock was at 0, in Unix time [s]: what is remembered outlives that clock.
-            localizer: what sees instead of the stack's own, for studies.
 
         Raises:
             ConfigError: a name or an option of the stack is wrong, or a module is to call a real robot's controller.
@@ -212,8 +209,7 @@ class StackNodes:
         estimator, estimator_contract = make("estimator")
         odometry, odometry_contract = make("odometry")
         mapper, mapper_contract = make("mapper")
-        own, contract = make("localizer")
-        eyes: Localizer = localizer or own
+        eyes, contract = make("localizer")
         legs, reserve = (
             CheckedLowerBody(*make(key, onboard=None if real else BusOnboard(bus)), stack.on_ground)
             for key in ("lower_body", "fallback")

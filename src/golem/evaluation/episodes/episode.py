@@ -9,6 +9,7 @@ from typing import Any
 
 from golem.errors import ConfigError
 from golem.evaluation.base import Onlooker
+from golem.evaluation.blame.oracles import with_modules
 from golem.evaluation.episodes.simulated_odometry import SimulatedOdometry
 from golem.hardware.safety.base import SafetyLimits
 from golem.interfaces import topics
@@ -75,7 +76,7 @@ def legs_stack(
     twin = stack.choice("robot")
     other = stack.with_choice("robot", others.pop("robot", twin)).choice("robot")
     stack = stack.with_choice("robot", Choice(other.use, {**twin.options, **other.options}))
-    return stack.with_choices(others)
+    return with_modules(stack, others)
 
 
 def episode_seed(seed: int, index: int) -> int:

@@ -7,27 +7,17 @@ camera had, stay as bad as they are.
 from __future__ import annotations
 
 import weakref
-from collections import deque
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from golem.capabilities.perception.lift import LiftConfig, lift, unproject
-from golem.evaluation.base import TrialSpec
-from golem.evaluation.episodes.episode import episode_seed
+from golem.evaluation.blame.altered_twin import AlteredTwin
 from golem.robots.mujoco.camera import CameraRig
-from golem.robots.mujoco.engine import MujocoRobot
-from golem.runtime.lockstep import LockstepRunner, build, build_robot
-from golem.stack import Stack
-from golem.types import TICK, Array, CameraInfo, Detection, LocalizedObject, Mask, RgbdImage
+from golem.types import Array, CameraInfo, Detection, LocalizedObject, Mask, RgbdImage
 
-USE = "truth"
-"""What `--use localizer=` says for these eyes."""
-KEPT = 500
-"""States that are kept: a frame is looked at within a second."""
 LEAST = 12
 """Pixels of a thing that is seen."""
 AWAY = 0.04
@@ -37,32 +27,25 @@ PACK = ("screw", "nut", "bus_bar", "tray", "screw_hole")
 
 
 class TrueMasks:
-    """Every part that is seen of what the twin's world names; a `Localizer`, and a node that remembers states.
+    """Every part that is seen of what the twin's world names; a `Localizer`.
 
     Attributes:
         latency: declared time per frame [s].
-        period: time between two states [s].
     """
 
     latency = 0.02
-    period = TICK
 
-    def __init__(self, robot: MujocoRobot) -> None:
-        """Look into `robot`."""
-        self._robot, self._model = robot, robot.scene.model
+    def __init__(self) -> None:
+        """Look into the twin of the trial."""
+        self._robot = AlteredTwin.newest()
+        self._model = self._robot.scene.model
         self._data = mujoco.MjData(self._model)
-        self._states: deque[tuple[float, Array, Array, Array]] = deque(maxlen=KEPT)
         self._rig: CameraRig | None = None
         self._lift = LiftConfig()
 
-    def step(self, t: float) -> None:
-        """Remember the state at the end of the tick at `t` [s]: what the next tick's exposures show."""
-        data = self._robot.data
-        self._states.append((t + TICK, data.qpos.copy(), data.mocap_pos.copy(), data.mocap_quat.copy()))
-
     def locate(self, frame: RgbdImage, labels: Sequence[str]) -> list[LocalizedObject]:
         """Return what is seen of `labels`; see `Localizer`."""
-        state = min(self._states, key=lambda kept: abs(kept[0] - frame.t), default=None)
+        state = min(self._robot.exposures, key=lambda kept: abs(kept[0] - frame.t), default=None)
         if state is None or not labels:
             return []
         _, self._data.qpos[:], self._data.mocap_pos[:], self._data.mocap_quat[:] = state
@@ -119,31 +102,6 @@ class TrueMasks:
         half = radius * frame.info.fx / z
         box = np.array([x - half, y - half, x + half, y + half])
         return lift(frame, Detection("screw_hole", 1.0, box, np.array([x, y])), self._lift)
-
-
-def with_modules(stack: Stack, overrides: Mapping[str, str]) -> Stack:
-    """Return `stack` with what a command replaces in it; the truth in the localizer's place is no module of it.
-
-    Raises:
-        ConfigError: a slot, a name or an option is wrong.
-    """
-    return stack.with_choices({slot: use for slot, use in overrides.items() if (slot, use) != ("localizer", USE)})
-
-
-def build_seeing(stack: Stack, spec: TrialSpec) -> tuple[LockstepRunner, Any]:
-    """Build the robot and the stack of a trial; with true masks where the trial asks for them.
-
-    Raises:
-        ConfigError, ModuleFault: see `build`.
-    """
-    seed = episode_seed(spec.seed, spec.index)
-    if spec.overrides.get("localizer") != USE:
-        return build(stack, seed)
-    robot = build_robot(stack, seed)
-    masks = TrueMasks(robot)
-    running = LockstepRunner(stack, robot, localizer=masks)
-    running.executor.add(masks)
-    return running, robot
 
 
 def _pixel(data: mujoco.MjData, info: CameraInfo, point: Array) -> tuple[tuple[float, float], float] | None:

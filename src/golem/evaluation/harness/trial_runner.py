@@ -96,6 +96,7 @@ class Request:
         limit: time that a batch may take, see `LadderConfig` [s].
         stop: by which comparisons are ended that are decided; None runs all `n`.
         ahead: trials of a method that are asked for at once where the next may not be needed.
+        only: the trials that are wanted; None is all.
     """
 
     rung: Rung[Any]
@@ -106,6 +107,7 @@ class Request:
     limit: float
     stop: StopRule | None = None
     ahead: int = 8
+    only: frozenset[Key] | None = None
 
     def spec(self, method: str, index: int, case: Case) -> TrialSpec:
         """Return one trial."""
@@ -128,13 +130,14 @@ class Request:
             for method in self.methods
         }
         ends = {} if self.stop is None else self._ends(self.stop, asked, found)
-        return [
+        specs = [
             self.spec(method, index, cases[number])
             for index in range(self.n)
             for number in range(max(len(cases) for cases in asked.values()))
             for method, cases in asked.items()
             if number < len(cases) and index < ends.get((method, case_name(cases[number])), self.n)
         ]
+        return [spec for spec in specs if self.only is None or spec.key in self.only]
 
     def _ends(
         self, stop: StopRule, asked: Mapping[str, Sequence[Case]], found: Mapping[Key, TrialOutcome]

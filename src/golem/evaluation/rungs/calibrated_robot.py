@@ -14,6 +14,7 @@ import numpy as np
 from golem import registry
 from golem.errors import ConfigError
 from golem.evaluation.base import DONE, Case, Results, Rung, TrialOutcome, TrialSpec
+from golem.evaluation.blame.oracles import with_modules
 from golem.evaluation.episodes.episode import episode_seed
 from golem.evaluation.rungs.pick_screw import SLOT, PickOptions, PickRung
 from golem.provenance import stack_facts
@@ -213,7 +214,8 @@ class CalibratedTether(PickRung):
     def _stack(self, method: str, profile: str, overrides: Mapping[str, str]) -> Stack:
         if SLOT in overrides:
             raise ConfigError(f"The method is what sits in {SLOT}; leave out --use {SLOT}=...")
-        stack = load_stack(STACK, profile=profile).with_choice(SLOT, method).with_choices(overrides)
+        stack = load_stack(STACK, profile=profile).with_choice(SLOT, method)
+        stack = with_modules(stack, overrides)
         return stack if self._file is None else stack.with_part("calibration", file=str(self._file))
 
 
@@ -243,7 +245,8 @@ def tagged_stack(profile: str, overrides: Mapping[str, str]) -> Stack:
     Raises:
         ConfigError: an override is wrong, or brings another robot.
     """
-    stack = load_stack(STACK, profile=profile).with_choices(overrides)
+    stack = load_stack(STACK, profile=profile)
+    stack = with_modules(stack, overrides)
     if not issubclass(registry.load("robot", stack.choice("robot").use), MujocoRobot):
         raise ConfigError("This rung judges on the simulator's truth; leave out --use robot=...")
     return stack.with_options("robot", tags=True, world="open")

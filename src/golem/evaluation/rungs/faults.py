@@ -13,6 +13,7 @@ from typing import Any
 
 from golem.errors import ConfigError, unknown_name
 from golem.evaluation.base import DONE, Case, Outcomes, Results, Rung, TrialOutcome, TrialSpec
+from golem.evaluation.blame.oracles import with_modules
 from golem.evaluation.episodes.episode import episode_seed
 from golem.evaluation.faults.catalogue import FAULTS
 from golem.evaluation.faults.judge import Judge, verdict
@@ -85,7 +86,7 @@ class FaultsRung(Rung[FaultOptions]):
         """Return the stack of a robot in `posture`: one of the shipped, on an open floor."""
         name = "tether" if posture == "hanging" else "stand"
         world = {"world": "open", **POSTURES[posture]}
-        return load_stack(name, profile=profile).with_options("robot", **world).with_choices(overrides)
+        return with_modules(load_stack(name, profile=profile).with_options("robot", **world), overrides)
 
     def cases(self, results: Results) -> Sequence[Case]:
         """Return every fault in every posture."""

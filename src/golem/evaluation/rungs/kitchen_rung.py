@@ -11,10 +11,10 @@ from typing import Any, ClassVar, Protocol, TypeVar
 
 from golem.errors import ConfigError
 from golem.evaluation.base import DONE, Rung, TrialOutcome, TrialSpec
+from golem.evaluation.blame.oracles import with_modules
 from golem.evaluation.episodes.counter_watch import ErrandWatch
-from golem.evaluation.episodes.episode import lost
+from golem.evaluation.episodes.episode import episode_seed, lost
 from golem.evaluation.episodes.oracle import Oracle
-from golem.evaluation.episodes.true_masks import build_seeing, with_modules
 from golem.evaluation.rungs.pick_screw import ABORTED, SLOT, balance, let_go
 from golem.provenance import stack_facts
 from golem.robots.mujoco.balance import TRACE
@@ -22,7 +22,7 @@ from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.mujoco.gl import shared_context
 from golem.robots.worlds.conditions import LayoutKind
 from golem.robots.worlds.kitchen import KitchenLayout
-from golem.runtime.lockstep import LockstepRunner
+from golem.runtime.lockstep import LockstepRunner, build
 from golem.skills.base import SkillResult
 from golem.slots import KEYS
 from golem.stack import Stack, load_stack
@@ -108,7 +108,7 @@ class KitchenRung(Rung[O]):
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
         """Run one trial; see `Rung`."""
         stack = self.arranged(spec, self.make_stack(spec.method, spec.profile, spec.overrides))
-        running, robot = build_seeing(stack, spec)
+        running, robot = build(stack, episode_seed(spec.seed, spec.index))
         if not isinstance(robot, MujocoRobot) or robot.scene.kitchen is None:
             raise ConfigError(
                 f"Rung {self.name} judges the twin's {self.subject}; robot: {stack.choice('robot').use} is none."

@@ -22,12 +22,12 @@ from golem.capabilities.grasping.centroid import grasp_pose
 from golem.capabilities.planning.joint_space import JointSpace, PlanningRobot
 from golem.errors import ConfigError
 from golem.evaluation.base import DONE, Case, Outcomes, Results, Rung, TrialOutcome, TrialSpec
+from golem.evaluation.blame.oracles import with_modules
 from golem.evaluation.episodes.episode import HANGS, READY, Loss, episode_seed, lost
 from golem.evaluation.episodes.oracle import Oracle
 from golem.evaluation.episodes.pick_blame import blame
 from golem.evaluation.episodes.pick_claims import REFUSALS, Fastener, claims
 from golem.evaluation.episodes.pick_watch import PickTouches, PickWatch
-from golem.evaluation.episodes.true_masks import build_seeing, with_modules
 from golem.evaluation.harness.arguments import read_sweep
 from golem.evaluation.metrics.text_table import TextTable
 from golem.evaluation.report.condition_plot import condition_plot
@@ -37,7 +37,7 @@ from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.mujoco.gl import shared_context
 from golem.robots.worlds.conditions import Conditions, LayoutKind, draw_conditions, world_stream
 from golem.runtime.executor import when_stepped
-from golem.runtime.lockstep import LockstepRunner
+from golem.runtime.lockstep import LockstepRunner, build
 from golem.skills.base import FAULT, SkillResult
 from golem.skills.pick_config import PickGoal, PickOutcome, PickReport
 from golem.slots import KEYS
@@ -257,7 +257,7 @@ class PickRung(Rung[PickOptions]):
             stack = stack.with_options("robot", layout=self.options.layout, conditions=dict(spec.case))
         if self.options.world != "pack":
             stack = stack.with_options("robot", world=self.options.world)
-        running, robot = build_seeing(stack, spec)
+        running, robot = build(stack, episode_seed(spec.seed, spec.index))
         if self.onlooker is not None:
             self.onlooker(running, robot)
         oracle = Oracle(robot)

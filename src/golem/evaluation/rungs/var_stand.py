@@ -16,6 +16,7 @@ from golem.capabilities.arms.reach_map import load_map
 from golem.capabilities.navigation.goto import GoTo
 from golem.errors import ConfigError
 from golem.evaluation.base import Case, Outcomes, Results, TrialOutcome, TrialSpec
+from golem.evaluation.blame.oracles import with_modules
 from golem.evaluation.episodes.contacts import ContactWatch
 from golem.evaluation.episodes.episode import Episode, Loss, episode_seed, lost
 from golem.evaluation.episodes.oracle import Oracle, place_error
@@ -143,7 +144,7 @@ class VarStandRung(PickRung):
         if "robot" in overrides or "grasp_method" in overrides:
             raise ConfigError("This rung brings robot and grasp method itself; leave out --use of both.")
         stack = load_stack("hall", profile=profile).with_choice("grasp_method", method)
-        return stack.with_choices(overrides)
+        return with_modules(stack, overrides)
 
 
 class _Trial:

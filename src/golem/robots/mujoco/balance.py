@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from golem.kernels import njit
-from golem.robots.mujoco.truth import Truth
+from golem.robots.mujoco.truth import TOUCH, Truth
 from golem.true_runs import true_runs
 from golem.types import Array
 
@@ -27,8 +27,6 @@ TRACE = "trace.npz"
 """Name of the file that holds a trial's trace among its artefacts."""
 PERIOD = 0.01
 """Time between two samples [s]."""
-TOUCH = 1.0
-"""Force from which a foot counts as in contact [N]."""
 SHORTEST_LIFT = 0.04
 """Time without contact that counts as a foot lifted [s]: less is a sole that chatters."""
 QUIET_SPEED = 0.05

@@ -10,7 +10,6 @@ import numpy as np
 from golem.robots.model import mjcf
 from golem.robots.model.imu_mount import TORSO, torso_motion
 from golem.robots.model.table import BASE_LINK, load_limits
-from golem.robots.mujoco.balance import TOUCH
 from golem.robots.mujoco.engine import standing_height
 from golem.robots.mujoco.external_forces import Pushes
 from golem.robots.mujoco.motors import Motors
@@ -93,8 +92,4 @@ class PlainRobot:
 
     def base(self) -> BaseEstimate:
         """Return the true base, in the words of an estimate."""
-        truth, odom = self.truth.base(), self.truth.T_world_odom
-        R, T = odom[:3, :3], truth.T_world_base
-        height = float(T[2, 3] - self.truth.soles()[:, :, 2].min())
-        contact = (self.truth.foot_forces()[:, 2] > TOUCH).astype(np.float64)
-        return BaseEstimate(self.t, np.linalg.inv(odom) @ T, truth.velocity @ R, height, contact)
+        return self.truth.estimate(self.t)

@@ -10,10 +10,12 @@ import mujoco
 import numpy as np
 
 from golem.robots.model.table import BASE_LINK, SOLE
-from golem.types import SIDES, Array, PlanarPose
+from golem.types import SIDES, Array, BaseEstimate, PlanarPose
 
 _CORNERS = np.array([[x, y, SOLE.z] for x, y in product(SOLE.x, SOLE.y)])
 """(4, 3) corners of a sole in its ankle_roll frame [m]."""
+TOUCH = 1.0
+"""Force from which a foot counts as in contact [N]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +69,14 @@ class Truth:
         T[:3, :3], T[:3, 3], T[3, 3] = R.reshape(3, 3), q[:3], 1.0
         v = self._data.qvel[self._v : self._v + 6]
         return BaseTruth(T, v[:3].copy(), v[3:].copy())
+
+    def estimate(self, t: float) -> BaseEstimate:
+        """Return the same at `t` [s], in the words of an estimate."""
+        truth, odom = self.base(), self.T_world_odom
+        R, T = odom[:3, :3], truth.T_world_base
+        height = float(T[2, 3] - self.soles()[:, :, 2].min())
+        contact = (self.foot_forces()[:, 2] > TOUCH).astype(np.float64)
+        return BaseEstimate(t, np.linalg.inv(odom) @ T, truth.velocity @ R, height, contact)
 
     def pose(self) -> PlanarPose:
         """Return where the robot stands and heads in odom."""

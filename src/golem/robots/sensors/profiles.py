@@ -174,12 +174,20 @@ def load_profile(name: str) -> RealismProfile:
 
     Args:
         name: `"ideal"`, `"bench"` or `"field"`, or a YAML file with the `base`, one of these, and keys of `OF_A_FILE`.
+            `NAME:PART+PART` is NAME with some attributes of `RealismProfile` as `ideal` has them, e.g. `field:head`.
 
     Raises:
         ConfigError: there is no profile of that name, or the file is none.
     """
     if name in PROFILES:
         return PROFILES[name]
+    start, colon, parts = name.rpartition(":")
+    if colon:
+        ideal, known = PROFILES["ideal"], [f.name for f in fields(RealismProfile) if f.name != "name"]
+        for part in parts.split("+"):
+            if part not in known:
+                raise unknown_name("part of a profile", part, known)
+        return replace(load_profile(start), **{part: getattr(ideal, part) for part in parts.split("+")})
     if not name.endswith((".yaml", ".yml")):
         raise unknown_name("profile", name, PROFILES)
     try:

@@ -1,0 +1,328 @@
+"""`golem blame`: lost trials of a ladder are run again with modules exchanged for truth: who lost how many."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import closing
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from tyro.conf import Positional, arg
+
+from golem.errors import ConfigError, unknown_name
+from golem.evaluation.base import RUNGS, rung_class
+from golem.evaluation.blame.game import Coalition, Points, Strata, coalitions, points, shapley
+from golem.evaluation.blame.oracles import ORACLES, NotHere
+from golem.evaluation.harness.ladder import LadderConfig, prepare
+from golem.evaluation.harness.records import Provenance, TrialRecord, read_records
+from golem.evaluation.harness.run_folder import RunFolder
+from golem.evaluation.harness.trial_executor import TrialExecutor, make_executor
+from golem.evaluation.harness.trial_runner import Key, Request, Runner
+from golem.evaluation.metrics.statistics import wilson
+from golem.evaluation.metrics.text_table import TextTable
+from golem.options import fill
+from golem.output_file import write_file
+
+FOLDER = "blame"
+"""Within a run folder, where the trials with exchanged modules are."""
+
+
+@dataclass(frozen=True)
+class BlameConfig:
+    """Say which modules lost the trials of finished ladder runs, by running the same trials with modules exchanged.
+
+    Trials go to RUN/blame, and are not run twice. Several runs, from the lowest rung up, give an error budget.
+    """
+
+    runs: Positional[tuple[Path, ...]]
+    """Run folders of `golem ladder`."""
+    only: Annotated[tuple[str, ...], arg(help_behavior_hint="(default: all that exchange something)")] = ()
+    """Oracles to try, e.g. detections arms."""
+    n: Annotated[int, arg(aliases=("-n",))] = 50
+    """Lost trials of each method that are run again, the first ones."""
+    harm: int = 20
+    """Won trials of each method that are run again, to see what an exchange loses."""
+    j: Annotated[int, arg(aliases=("-j",))] = 1
+    """Processes that run trials at the same time."""
+    executor: str = "local"
+    """As of `golem ladder`."""
+    limit: float = 600.0
+    """As of `golem ladder` [s]."""
+    json: bool = False
+    """Print the figures as a last line of JSON."""
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """What was found of one method of a run.
+
+    Attributes:
+        rung, method: of the run.
+        strata: its trials.
+        singles: oracle -> lost trials that it wins, won trials that it loses, and its points.
+        pairs: two oracles -> points, of those that matter.
+        all_wins: lost trials that are won with everything exchanged.
+        shares: oracle that matters -> Shapley's share.
+        total: points of all that matter, exchanged together.
+        orders: how many orders were drawn; 0 where all coalitions were run.
+    """
+
+    rung: str
+    method: str
+    strata: Strata
+    singles: dict[str, tuple[int, int, Points]]
+    pairs: dict[str, Points]
+    all_wins: int
+    shares: dict[str, Points]
+    total: Points
+    orders: int
+
+    @property
+    def first(self) -> str | None:
+        """The oracle with the largest share, if any is above 0."""
+        best = max(self.shares, key=lambda name: self.shares[name].value, default=None)
+        return best if best is not None and self.shares[best].value > 0.0 else None
+
+    @property
+    def proved(self) -> list[str]:
+        """The oracles whose exchange alone is proved to win trials, the most points first."""
+        found = [name for name, (_, _, one) in self.singles.items() if one.proved]
+        return sorted(found, key=lambda name: -self.singles[name][2].value)
+
+    def tables(self) -> list[TextTable]:
+        """Return what is printed."""
+        s = self.strata
+        rate = wilson(s.won / s.alike, s.n / s.alike)
+        head = f"{self.rung}, {self.method}: {s.won} of {s.n} won, {rate.text(100)} %"
+        rows = [
+            (name, ORACLES[name].words if name in ORACLES else "", f"{won} of {len(s.lost_run)}",
+             f"{lost} of {len(s.won_run)}" if lost >= 0 else "-", *_cells(one), "yes" if one.proved else "")
+            for name, (won, lost, one) in sorted(self.singles.items(), key=lambda row: -row[1][2].value)
+        ]  # fmt: skip
+        columns = ("exchanged", "for", "lost trials won", "won trials lost", "points", "95 %", "proved")
+        found = [TextTable(f"{head}: one module exchanged", columns, tuple(rows), self._words())]
+        if self.shares:
+            shares = sorted(self.shares.items(), key=lambda row: -row[1].value)
+            rows = [(name, *_cells(one)) for name, one in (*shares, ("together", self.total))]
+            how = f"{self.orders} orders drawn" if self.orders else "all coalitions"
+            found.append(TextTable(f"{head}: Shapley's shares ({how})", ("module", "points", "95 %"), tuple(rows)))
+        if self.pairs:
+            best = sorted(self.pairs.items(), key=lambda row: -row[1].value)
+            rows = [(name, *_cells(one)) for name, one in best]
+            found.append(TextTable(f"{head}: two exchanged", ("modules", "points", "95 %"), tuple(rows)))
+        return found
+
+    def _words(self) -> str:
+        """Return what buys the most, and what nothing here buys."""
+        left = len(self.strata.lost_run) - self.all_wins
+        rest = f"With everything exchanged {left} of {len(self.strata.lost_run)} lost trials are lost all the same."
+        if not self.proved:
+            return f"No module is proved to lose trials (95 % for all {len(self.singles)} together). {rest}"
+        best = self.proved[0]
+        text = self.singles[best][2].interval.text(100)
+        return f"A better {best} buys the most: {text} points. {rest}"
+
+
+def _cells(one: Points) -> tuple[str, str]:
+    return f"{100 * one.value:+.1f}", one.interval.text(100, "+")
+
+
+class _Trials:
+    """Runs the trials of one run folder again under coalitions of oracles."""
+
+    def __init__(self, run: Path, records: Sequence[TrialRecord], config: BlameConfig, executor: TrialExecutor) -> None:
+        self._run, self._first, self._executor = run, records[0], executor
+        self._methods = tuple(dict.fromkeys(r.method for r in records))
+        self._n = 1 + max(r.index for r in records)
+        self._config = config
+        self._asked: dict[Coalition, tuple[Request, Provenance]] = {}
+        self.won: dict[Coalition, dict[Key, bool]] = {frozenset(): {r.key: r.success for r in records}}
+        request, provenance = self._prepare(frozenset())
+        if request.rung.adaptive:
+            raise ConfigError(f"Rung {request.rung.name} searches levels; golem blame takes rungs with fixed trials.")
+        first = self._first
+        if (first.code, dict(first.versions)) != (provenance.code, dict(provenance.versions)):
+            raise ConfigError(
+                f"{run} was run by other code or packages, commit {first.commit}; run golem ladder again with this one."
+            )
+
+    def _prepare(self, exchanged: Coalition) -> tuple[Request, Provenance]:
+        if exchanged not in self._asked:
+            r, kind = self._first, rung_class(self._first.rung)
+            use = dict(r.overrides)
+            if exchanged:
+                use["oracle"] = "+".join(filter(None, (use.get("oracle"), name_of(exchanged))))
+            config = LadderConfig(
+                rung=r.rung, method=self._methods, n=self._n, profile=r.profile, seed=r.seed, j=self._config.j,
+                use=tuple(f"{slot}={value}" for slot, value in use.items()), limit=self._config.limit,
+                executor=self._config.executor, options=fill("option of the run", kind.Options, r.options),
+            )  # fmt: skip
+            self._asked[exchanged] = prepare(config.whole())
+        return self._asked[exchanged]
+
+    def candidates(self) -> list[str]:
+        """Return the oracles that exchange something in every method's stack."""
+        found: list[str] = []
+        for name in self._config.only or ORACLES:
+            if name not in ORACLES:
+                raise unknown_name("oracle", name, ORACLES)
+            try:
+                self._prepare(frozenset([name]))
+                found.append(name)
+            except NotHere as why:
+                if self._config.only:
+                    raise
+                print(f"{self._run}: {why}", file=sys.stderr)
+        return found
+
+    def run(self, exchanged: Coalition, keys: Iterable[Key]) -> None:
+        """Run the trials `keys` with oracles in the place of what is `exchanged`, unless they were."""
+        if not exchanged:
+            return
+        request, provenance = self._prepare(exchanged)
+        only = frozenset(keys)
+        request = replace(request, only=only)
+        with RunFolder(self._run / FOLDER / name_of(exchanged)) as folder:
+            held = folder.resume(request.example, provenance)
+            if not only <= {record.key for record in held}:
+                print(f"Exchanged: {name_of(exchanged)}", file=sys.stderr)
+                command = f"golem blame {self._run}"
+                held = Runner(request, provenance, folder, self._executor, command).run(held)
+                folder.finish(held, self._methods)
+                folder.state(command, provenance)
+        self.won[exchanged] = {record.key: record.success for record in held}
+
+
+def name_of(exchanged: Coalition) -> str:
+    """Return what a coalition's folder is called: its oracles in the order of the table."""
+    return "+".join(sorted(exchanged, key=list(ORACLES).index))
+
+
+def judge(trials: _Trials, method: str, names: Sequence[str], config: BlameConfig, rung: str) -> Verdict:
+    """Run what is needed of one method, and say what each exchange is worth.
+
+    An exchange that wins no lost trial alone, and is not missed where all together win one, is not paired.
+    """
+    base = {key: won for key, won in trials.won[frozenset()].items() if key[0] == method}
+    lost, won = ([key for key, success in base.items() if success is flag] for flag in (False, True))
+    alike = max(sum(other[2] == key[2] for other in base) for key in base)
+    strata = Strata(len(lost), len(won), tuple(lost[: config.n]), tuple(_spread(won, config.harm)), alike)
+    keys: list[Key] = [*lost[: config.n], *_spread(won, config.harm)]
+    run, everything = trials.run, frozenset(names)
+    run(everything, lost[: config.n])
+    for name in names:
+        run(frozenset([name]), lost[: config.n])
+
+    def wins(who: Coalition) -> list[Key]:
+        return [key for key in lost[: config.n] if trials.won[who][key]]
+
+    alone = {name: wins(frozenset([name])) for name in names}
+    matter = [name for name in names if alone[name]]
+    jointly = [key for key in wins(everything) if not any(key in keys for keys in alone.values())]
+    if jointly:  # what only several together win: who is missed?
+        for name in names:
+            rest = everything - {name}
+            run(rest, jointly)
+            if name not in matter and not all(trials.won[rest][key] for key in jointly):
+                matter.append(name)
+    chosen, orders = coalitions(matter, np.random.default_rng(0))
+    for who in chosen:
+        run(who, keys)
+
+    def value(who: Coalition, key: Key) -> float:
+        return float(trials.won[who][key])
+
+    def effect(who: Coalition, compared: int = 1) -> Points:
+        return points(strata, {key: value(who, key) - float(base[key]) for key in keys}, compared)
+
+    singles: dict[str, tuple[int, int, Points]] = {}
+    for name in names:
+        who = frozenset([name])
+        if name in matter and who in chosen:
+            losses = sum(not trials.won[who][key] for key in strata.won_run)  # pyright: ignore[reportArgumentType]
+            singles[name] = len(alone[name]), losses, effect(who, len(names))
+        else:
+            only = replace(strata, won_run=())
+            singles[name] = 0, -1, points(only, dict.fromkeys(lost, 0.0), len(names))
+    each = {key: shapley(matter, orders, lambda who, key=key: value(who, key)) for key in keys}
+    shares = {name: points(strata, {key: each[key][name] for key in keys}) for name in matter}
+    pairs = {name_of(who): effect(who) for who in chosen if len(who) == 2}
+    total = effect(frozenset(matter))
+    return Verdict(rung, method, strata, singles, pairs, len(wins(everything)), shares, total, len(orders))
+
+
+def _spread(keys: list[Key], most: int) -> list[Key]:
+    """Return up to `most` of `keys`, evenly spread."""
+    return keys if len(keys) <= most else [keys[k * len(keys) // most] for k in range(most)]
+
+
+def run_blame(config: BlameConfig) -> int:
+    """Run, print and write what each module is worth; returns how many verdicts there are.
+
+    Raises:
+        ConfigError: a folder is no finished run of this code, or an oracle is none.
+        golem.errors.OutputError: records are torn, or of another version, or another process writes there.
+    """
+    if config.n < 1 or config.harm < 0:
+        raise ConfigError("-n is 1 or more, and --harm 0 or more.")
+    verdicts: list[Verdict] = []
+    with closing(make_executor(config.executor, config.j)) as executor:
+        for run in config.runs:
+            records = read_records(run / "trials.jsonl")
+            if not records:
+                raise ConfigError(f"{run} holds no trials; give the --out folder of a finished golem ladder.")
+            if records[0].rung not in RUNGS:
+                raise unknown_name(f"rung in {run}", records[0].rung, RUNGS)
+            trials = _Trials(run, records, config, executor)
+            names = trials.candidates()
+            if not names:
+                raise ConfigError(f"{run}: no oracle exchanges anything there.")
+            found = [judge(trials, m, names, config, records[0].rung) for m in dict.fromkeys(r.method for r in records)]
+            verdicts += found
+            text = "\n\n".join(table.markdown() for verdict in found for table in verdict.tables())
+            write_file(run / FOLDER / "blame.md", text + "\n")
+            write_file(run / FOLDER / "blame.json", figures(found) + "\n")
+    tables = [table for verdict in verdicts for table in verdict.tables()]
+    if len(config.runs) > 1:
+        tables.append(budget(verdicts))
+    print("\n\n".join(table.terminal() for table in tables))
+    if config.json:
+        print(figures(verdicts))
+    return len(verdicts)
+
+
+def figures(verdicts: Sequence[Verdict]) -> str:
+    """Return verdicts as one line of JSON, without the names of their trials."""
+    rows: list[dict[str, Any]] = []
+    for one in verdicts:
+        row = asdict(one)
+        strata = row.pop("strata")
+        counts = {"lost_run": len(one.strata.lost_run), "won_run": len(one.strata.won_run)}
+        rows.append({**row, **strata, **counts, "first": one.first, "proved": one.proved})
+    return json.dumps(rows)
+
+
+def budget(verdicts: Sequence[Verdict]) -> TextTable:
+    """Return the error budget from rung to rung, of each method: success, and each module's share of what is lost."""
+    names = list(dict.fromkeys(name for one in verdicts for name in one.shares))
+    rows: list[tuple[str, ...]] = []
+    for method in dict.fromkeys(one.method for one in verdicts):
+        before: Mapping[str, float] = {}
+        for one in (v for v in verdicts if v.method == method):
+            s, now = one.strata, {name: p.value for name, p in one.shares.items()}
+            cells = [
+                f"{100 * now.get(n, 0.0):.1f} ({100 * (now.get(n, 0.0) - before.get(n, 0.0)):+.1f})" for n in names
+            ]
+            rest = (s.n - s.won) / s.n - one.total.value
+            rate = f"{100 * s.won / s.n:.1f} {wilson(s.won / s.alike, s.n / s.alike).text(100)}"
+            rows.append((method, one.rung, rate, *cells, f"{100 * rest:.1f}"))
+            before = now
+    note = (
+        "Success and points [%]: Shapley's shares of what is lost, in brackets what a rung adds to the one above it in "
+        "the table; the rest is lost by what has no oracle, and by chance."
+    )
+    return TextTable("Error budget", ("method", "rung", "success", *names, "rest"), tuple(rows), note)
