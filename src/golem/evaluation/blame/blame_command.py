@@ -131,7 +131,7 @@ def _cells(one: Points) -> tuple[str, str]:
     return f"{100 * one.value:+.1f}", one.interval.text(100, "+")
 
 
-class _Trials:
+class Trials:
     """Runs the trials of one run folder again under coalitions of oracles."""
 
     def __init__(self, run: Path, records: Sequence[TrialRecord], config: BlameConfig, executor: TrialExecutor) -> None:
@@ -202,7 +202,7 @@ def name_of(exchanged: Coalition) -> str:
     return "+".join(sorted(exchanged, key=list(ORACLES).index))
 
 
-def judge(trials: _Trials, method: str, names: Sequence[str], config: BlameConfig, rung: str) -> Verdict:
+def judge(trials: Trials, method: str, names: Sequence[str], config: BlameConfig, rung: str) -> Verdict:
     """Run what is needed of one method, and say what each exchange is worth.
 
     An exchange that wins no lost trial alone, and is not missed where all together win one, is not paired.
@@ -277,7 +277,7 @@ def run_blame(config: BlameConfig) -> int:
                 raise ConfigError(f"{run} holds no trials; give the --out folder of a finished golem ladder.")
             if records[0].rung not in RUNGS:
                 raise unknown_name(f"rung in {run}", records[0].rung, RUNGS)
-            trials = _Trials(run, records, config, executor)
+            trials = Trials(run, records, config, executor)
             names = trials.candidates()
             if not names:
                 raise ConfigError(f"{run}: no oracle exchanges anything there.")

@@ -1,23 +1,21 @@
-"""What can be exchanged for truth, slot by slot, and which defects can be planted: two tables, a line each."""
+"""What can be exchanged for truth, and which defects can be planted: see `oracles.yaml` and `defects.yaml`."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 from golem import registry
 from golem.errors import ConfigError, unknown_name
+from golem.package_data import load_data
 from golem.robots.mujoco.config import WITH_PACK
 from golem.robots.sensors.profiles import load_profile
 from golem.runtime.node_groups import hears_lidar
 from golem.slots import KEYS
 from golem.stack import Choice, Stack
 
-HERE = "golem.evaluation.blame."
-ALTERED = f"{HERE}altered_twin:AlteredTwin"
-TRUE = f"{HERE}true_modules:"
-MASKS = "golem.evaluation.episodes.true_masks:TrueMasks"
+ALTERED = "golem.evaluation.blame.altered_twin:AlteredTwin"
 STANDS, HANGS, HEARS, PACK = "stands", "hangs", "listens to its LiDAR", "works on a pack"
 
 
@@ -41,57 +39,21 @@ class Exchange:
     """
 
     words: str
-    parts: tuple[str, ...] = ()
+    parts: Sequence[str] = ()
     choices: Mapping[str, str] = field(default_factory=dict[str, str])
     twin: Mapping[str, Any] = field(default_factory=dict[str, Any])
     only: str = ""
-    sizes: tuple[float, ...] = ()
-    option: tuple[str, str] = ("", "")
+    sizes: Sequence[float] = ()
+    option: Sequence[str] = ()
     rung: str = ""
     right: str = ""
 
 
-# fmt: off
-ORACLES: dict[str, Exchange] = {
-    "detections": Exchange("the simulator's masks in the localizer's place", choices={"localizer": MASKS}),
-    "depth": Exchange("depth and colour without noise", ("depth", "colour_noise")),
-    "head": Exchange("a head camera that is where its calibration says", ("head",)),
-    "palm": Exchange("palm cameras that are where their calibration says", ("palm",)),
-    "lenses": Exchange("lenses as the cameras claim them", ("focal", "principal")),
-    "grasp": Exchange("the shipped closed loop in the grasp method's place", choices={"grasp_method": "visual_servo"},
-                      only=PACK),
-    "arms": Exchange("arms without encoder error and dry friction under the shipped control",
-                     ("arm_offset", "zeros", "arm_friction"), {"upper_body": "diff_ik", "planner": "rrt_connect"}),
-    "hand": Exchange("the shipped hand with pads of three times the friction", choices={"hand": "magpie"},
-                     twin={"grip": 3.0}),
-    "base": Exchange("the true pose and velocity of the base", ("imu",), {"estimator": f"{TRUE}TrueBase"}),
-    "odometry": Exchange("the true way of the base", choices={"odometry": f"{TRUE}TrueOdometry"}, only=HEARS),
-    "legs": Exchange("a pelvis that is held, on legs without error", ("leg_offset", "leg_friction"),
-                     twin={"held": True, "leg_torque": 1.0}, only=STANDS),
-    "delay": Exchange("commands that act at once, and sound reports of the motors", ("actuator_delay", "motors"),
-                      twin={"latency": 0.0}),
-    "sway": Exchange("a hoist that hangs still", ("hoist_sway",), only=HANGS),
-}
-"""Oracle -> what it exchanges. Skills, memory, navigator, mapper, servo and gate have none."""
-
-DEFECTS: dict[str, Exchange] = {
-    "shifted_detector": Exchange("objects are seen beside their places [m]",
-        choices={"localizer": f"{TRUE}ShiftedDetector"}, option=("localizer", "shift"),
-        sizes=(0.004, 0.008, 0.012, 0.018, 0.026), rung="tether", right="detections"),
-    "slow_ik": Exchange("speed of the arms [rad/s]", option=("upper_body", "arm_speed"),
-        sizes=(0.4, 0.2, 0.1, 0.05, 0.025), rung="tether", right="arms"),
-    "weak_legs": Exchange("share of the leg motors' torque", option=("robot", "leg_torque"),
-        sizes=(0.5, 0.4, 0.3, 0.2, 0.1), rung="stand", right="legs"),
-    "odometry_scale": Exchange("length of a way over the true one",
-        choices={"odometry": f"{TRUE}ScaledOdometry"}, option=("odometry", "scale"),
-        sizes=(1.02, 1.05, 1.1, 1.15, 1.2), rung="navigate", right="odometry"),
-    "loose_grip": Exchange("share of the force of the fingers", choices={"hand": f"{TRUE}LooseHand"},
-        option=("hand", "share"), sizes=(0.5, 0.3, 0.2, 0.1, 0.05), rung="tether", right="hand"),
-    "late_gate": Exchange("time by which commands pass late [s]", option=("robot", "latency"),
-        sizes=(0.02, 0.04, 0.08, 0.12, 0.2), rung="stand", right="delay"),
-}
-"""Defect -> what it spoils; `--use defect=NAME:1` plants its smallest size, 5 its largest."""
-# fmt: on
+ORACLES, DEFECTS = (
+    {name: Exchange(**row) for name, row in load_data(__package__, f"{table}.yaml").items()}
+    for table in ("oracles", "defects")
+)
+"""Oracle, or defect, -> what it exchanges."""
 
 
 def with_modules(stack: Stack, overrides: Mapping[str, str]) -> Stack:
