@@ -269,6 +269,8 @@ COMMANDS: dict[str, Callable[[list[str]], int]] = {
     "publish": _command("Write a static site from studies: leaderboards, methods, every trial, the data.",
                         "golem.evaluation.report.site", "PublishConfig:run_publish", True),
     "blame": _blame,
+    "real": _command("Put real trials beside the twin's: which it predicts, and the real success by both.",
+                     "golem.evaluation.real.real_command", "RealConfig:run_real", True),
     "results": _command("Write the tables of run folders as Markdown, as they stand in the documentation.",
                         "golem.evaluation.metrics.results", "ResultsConfig:run_results"),
     "model": _model,

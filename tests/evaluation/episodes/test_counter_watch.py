@@ -44,3 +44,12 @@ def test_a_thing_that_was_lifted_and_set_down_elsewhere_is_judged_by_its_place(r
     assert watch.problem((x, y + 0.15)) is None
     assert watch.series((x, y + 0.15))["set_down_error"] == pytest.approx(0.0, abs=2e-3)
     assert watch.problem((x, y)) == "The can is 15 cm from its place."
+    assert watch.astray((x, y)) and not watch.astray((x, y + 0.15))
+    # What fell to the floor, or lies on its side, was not set down beside its place by a robot that lost its way.
+    put(robot, thing.body, (0.0, 0.0, -0.5))
+    assert not watch.astray((x, y))
+    put(robot, thing.body, (0.0, 0.0, 0.5))
+    first = robot.scene.model.jnt_qposadr[robot.scene.model.body_jntadr[robot.scene.model.body(thing.body).id]]
+    robot.data.qpos[first + 3 : first + 7] = (0.7071, 0.7071, 0.0, 0.0)
+    mujoco.mj_kinematics(robot.scene.model, robot.data)
+    assert not watch.astray((x, y))

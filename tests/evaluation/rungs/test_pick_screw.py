@@ -115,8 +115,12 @@ def truth(
     tilt: float = 0.0,
     calibration: float = 0.0,
     seen: float = 0.0,
+    told: float | None = None,
+    left: float | None = None,
 ) -> GraspTruth:
-    return GraspTruth(aim, reach, miss, 0.004, tilt, calibration, seen)
+    """What happened; of an open loop, where a servo law says nothing else."""
+    told, left = aim if told is None else told, reach if left is None else left
+    return GraspTruth(aim, reach, miss, 0.004, tilt, told, left, calibration, seen)
 
 
 @pytest.mark.parametrize(
@@ -130,11 +134,19 @@ def truth(
         ("grasp", "grasp_method", truth(aim=0.01, reach=0.05, miss=0.05, calibration=0.05), "upper_body"),
         ("extract", "grasp_method", truth(tilt=2 * STRAIGHT), "upper_body"),
         ("extract", "grasp_method", truth(), "grasp_method"),
-        ("place", "grasp_method", truth(), "localizer"),
+        ("place", "grasp_method", truth(), "grasp_method"),
+        # A servo law's command is as far from hand and screw as the arm errs, which says nothing of the miss.
+        ("grasp", "grasp_method", truth(aim=0.026, reach=0.025, miss=0.02, told=0.02, left=0.001), "localizer"),
+        ("grasp", "grasp_method", truth(aim=0.026, reach=0.025, miss=0.02, told=0.001, left=0.02), "upper_body"),
     ],
 )
 def test_the_larger_error_takes_the_blame(stage: str, slot: str, seen: GraspTruth | None, culprit: str) -> None:
     assert blame(stage, slot, seen) == culprit
+
+
+def test_a_screw_lost_on_the_way_to_the_tray_is_the_grips_and_one_let_go_beside_it_is_not() -> None:
+    assert blame("place", "grasp_method", truth(), drop_inside=0.03) == "grasp_method"
+    assert blame("place", "grasp_method", truth(), drop_inside=-0.01) == "localizer"
 
 
 def test_the_calibration_of_the_head_camera_is_told_from_what_was_seen() -> None:

@@ -12,7 +12,6 @@ from golem.capabilities.odometry.legs import Legs
 from golem.capabilities.odometry.lio import Lio
 from golem.capabilities.perception.onnx_detector import OnnxDetector
 from golem.evaluation.blame.altered_twin import AlteredTwin
-from golem.hardware.hands.magpie import MagpieHand
 from golem.interfaces.lidar import LegOdometry
 from golem.types import BaseEstimate, LocalizedObject, LowState, RgbdImage
 
@@ -53,7 +52,7 @@ class ShiftedDetector(OnnxDetector):
     """The shipped detector, whose objects are all `shift` [m] too far to the right in the image."""
 
     def __init__(self, shift: float = 0.0) -> None:
-        """Load the shipped network."""
+        """Load the shipped network; see `OnnxDetector`."""
         super().__init__()
         self._shift = shift
 
@@ -80,16 +79,3 @@ class ScaledOdometry(Lio):
         T = found.T_odom_base.copy()
         T[:3, 3] *= self._scale
         return replace(found, T_odom_base=T, velocity=found.velocity * self._scale)
-
-
-class LooseHand(MagpieHand):
-    """The shipped hand, which presses with `share` of the force that is asked for."""
-
-    def __init__(self, share: float = 1.0) -> None:
-        """Start opening; see `MagpieHand`."""
-        super().__init__()
-        self._pressed = share
-
-    def close(self, force: float) -> None:
-        """Close with too little force; see `HandController`."""
-        super().close(self._pressed * force)

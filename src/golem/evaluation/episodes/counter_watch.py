@@ -114,6 +114,15 @@ class CounterWatch(ErrandWatch):
                 return f"The {after.kind} beside it was moved by {1e2 * moved:.0f} cm or knocked over."
         return None
 
+    def astray(self, place: tuple[float, float]) -> bool:
+        """Return whether one of the kind was lifted and stands upright at its height, but not at `place`."""
+        now, lifted = self._things(), self._lifted()
+        if not lifted or now[lifted[0]].lean > UPRIGHT:
+            return False
+        moved = now[lifted[0]].position - self._before[lifted[0]].position
+        off = float(np.hypot(*(now[lifted[0]].position[:2] - place)))
+        return off > THERE and abs(float(moved[2])) <= LEVEL
+
     def series(self, place: tuple[float, float]) -> dict[str, float]:
         """Return how far from its place the thing stands, where it was lifted, and how far others were moved [m]."""
         now = self._things()

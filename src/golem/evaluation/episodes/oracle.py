@@ -105,8 +105,12 @@ class GraspTruth:
             hand as it was: one that is too high or too low misses nothing.
         depth: height of the screw's head above the fingertips [m], positive when the tips are below it.
         tilt: angle between approach axis and vertical [rad].
-        calibration: what `aim` owes to the calibration of the camera that the hand was sent by [m].
-        seen: what `aim` would be without that [m].
+        told: from where the camera by which the hand was sent had the screw to the screw [m]. Of an open loop that is
+            `aim`; a servo law moves its command until the palm camera has the screw between the fingers, so that
+            command and hand are apart by the arm's error, and that is no fault.
+        left: from there to the hand [m]: what the arm, or the servo law, left over.
+        calibration: what `told` owes to the calibration of that camera [m].
+        seen: what `told` would be without that [m].
     """
 
     aim: float
@@ -114,6 +118,8 @@ class GraspTruth:
     miss: float
     depth: float
     tilt: float
+    told: float
+    left: float
     calibration: float = 0.0
     seen: float = 0.0
 
@@ -194,22 +200,33 @@ class Oracle:
         believed = T @ self._robot.calibration[camera] @ np.linalg.inv(T) @ (*point, 1.0)
         return believed[:3] - point
 
-    def grasp(self, side: Side, T_commanded: Array, camera: str) -> GraspTruth:
-        """Compare where the hand is, where it was sent (4, 4, in odom) by `camera`, and where the nearest screw is."""
+    def grasp(self, side: Side, T_commanded: Array, camera: str, looked_at: Array | None = None) -> GraspTruth:
+        """Compare where the hand is, where it was sent, and where the nearest screw is.
+
+        Args:
+            side: which hand.
+            T_commanded: (4, 4) pose in odom that it was sent to.
+            camera: by which.
+            looked_at: (3,) where a servo law had the screw, as far from the true hand as it believed it to be from the
+                hand, in odom [m]; None of an open loop.
+        """
         T = self.gripper(side)
         heads = self.screw_heads()
         screws = (heads - T[:3, 3]) @ T[:3, :3]
         nearest = int(np.argmin(np.hypot(screws[:, 0], screws[:, 1])))
         screw, shift = screws[nearest], self.camera_shift(camera, heads[nearest]) @ T[:3, :3]
         sent = (T_commanded[:3, 3] - T[:3, 3]) @ T[:3, :3]
+        had = sent if looked_at is None else (looked_at - T[:3, 3]) @ T[:3, :3]
         return GraspTruth(
             aim=float(np.hypot(*(screw - sent)[:2])),
             reach=float(np.hypot(*sent[:2])),
             miss=float(np.hypot(*screw[:2])),
             depth=-float(screw[2]),
             tilt=float(np.arccos(np.clip(-T[2, 2], -1.0, 1.0))),
+            told=float(np.hypot(*(screw - had)[:2])),
+            left=float(np.hypot(*had[:2])),
             calibration=float(np.hypot(*shift[:2])),
-            seen=float(np.hypot(*(screw + shift - sent)[:2])),
+            seen=float(np.hypot(*(screw + shift - had)[:2])),
         )
 
     def picture(self) -> bytes:

@@ -153,6 +153,7 @@ class PickWatch(ErrandWatch):
         if feedback.stage == "grasp" and not feedback.data.get("failed"):
             # Where it servoed, the camera in the palm sent the hand, else that of the head.
             camera = f"{self._side}_hand" if self._servoed else "head"
-            self.grasp = self._oracle.grasp(self._side, self._running.commanded(self._side), camera)
+            looked_at = self.looked_at.get(self._attempt) if self._servoed else None
+            self.grasp = self._oracle.grasp(self._side, self._running.commanded(self._side), camera, looked_at)
         if feedback.stage == DONE or feedback.data.get("failed"):
             self.picture = self._oracle.picture()

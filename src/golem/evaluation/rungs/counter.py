@@ -259,8 +259,9 @@ class FetchRung(KitchenRung[FetchOptions]):
         def judge() -> Verdict:
             seen, off = counter_verdict(watch, place), place_error(running.bus, robot)
             series = seen.series | ways | {"place_error": off}
-            # Places are in the frame of the memory: a robot that errs about its own sets things down beside them.
-            lost_its_way = off > 0.5 * series.get("set_down_error", math.inf)
+            # Places are in the frame of the memory: a robot that errs about its own sets things down beside them. What
+            # fell, leans or lies on the floor was lost by the grasp, however far from its place.
+            lost_its_way = watch.astray(place) and off > 0.5 * series.get("set_down_error", math.inf)
             return replace(seen, series=series, slot="odometry" if lost_its_way else seen.slot)
 
         return Errand(result, watch, judge)

@@ -353,7 +353,7 @@ def judge_pick(stack: Stack, result: SkillResult, oracle: Oracle, watch: PickWat
         return TrialOutcome(True, DONE, None, result.reason, result.timings, series, watch.picture)
     # The skill may believe it succeeded: then the screw was lost between the pull and the tray.
     stage = result.stage if result.stage != DONE else "place"
-    slot = blame(stage, result.slot, truth)
+    slot = blame(stage, result.slot, truth, watch.drop_inside)
     module = None if slot is None else f"{slot}: {stack.choice(slot).use}" if slot in KEYS else slot
     detail = result.reason if result.stage != DONE else "The skill reports success, but no screw is in the tray."
     picture = watch.last_picture()

@@ -1,0 +1,1 @@
+"""Trials of a real robot beside the twin's."""
