@@ -16,12 +16,58 @@ import tyro
 
 from golem.errors import unknown_name
 from golem.evaluation.blame.blame_command import BlameConfig, Trials, Verdict, judge
-from golem.evaluation.blame.oracles import DEFECTS
+from golem.evaluation.blame.oracles import ALTERED
 from golem.evaluation.harness.ladder import LadderConfig, run_ladder
 from golem.evaluation.harness.records import read_records
 from golem.evaluation.harness.trial_executor import make_executor
 from golem.evaluation.metrics.statistics import wilson
 from golem.evaluation.metrics.text_table import TextTable
+
+HERE = Path(__file__).with_name("planted_defects.py")
+
+
+@dataclass(frozen=True)
+class Defect:
+    """A defect in five sizes.
+
+    Attributes:
+        use: word of `--use` that plants it, with `SIZE` in the place of a size.
+        sizes: from small to large.
+        rung: where it is tried.
+        right: the oracle that makes up for it.
+    """
+
+    use: str
+    sizes: tuple[float, ...]
+    rung: str
+    right: str
+
+
+DEFECTS = {
+    # Objects are seen beside their places [m].
+    "shifted_detector": Defect(
+        f"localizer={{use: '{HERE}:ShiftedDetector', shift: SIZE}}",
+        (0.004, 0.008, 0.012, 0.018, 0.026), "tether", "detections",
+    ),
+    # Speed of the arms [rad/s].
+    "slow_ik": Defect(
+        "upper_body={use: diff_ik, arm_speed: SIZE}", (0.4, 0.2, 0.1, 0.05, 0.025), "tether", "arms"
+    ),
+    # Share of the leg motors' torque.
+    "weak_legs": Defect(
+        f"robot={{use: '{ALTERED}', support: ground, leg_torque: SIZE}}", (0.5, 0.4, 0.3, 0.2, 0.1), "stand", "legs"
+    ),
+    # Length of a way over the true one.
+    "odometry_scale": Defect(
+        f"odometry={{use: '{HERE}:ScaledOdometry', scale: SIZE}}", (1.02, 1.05, 1.1, 1.15, 1.2), "navigate", "odometry"
+    ),
+    # Share of the finger pads' friction.
+    "loose_grip": Defect(f"robot={{use: '{ALTERED}', grip: SIZE}}", (0.6, 0.4, 0.25, 0.15, 0.08), "tether", "hand"),
+    # Time by which commands pass late [s].
+    "late_gate": Defect(
+        f"robot={{use: '{ALTERED}', support: ground, latency: SIZE}}", (0.02, 0.04, 0.08, 0.12, 0.2), "stand", "delay"
+    ),
+}  # fmt: skip
 
 METHODS = {"navigate": "costmap_astar"}
 """Rung -> its method, where it is not `visual_servo`."""
@@ -60,11 +106,11 @@ class BlameCheck:
     """Processes."""
 
 
-def verdict(config: BlameCheck, rung: str, defect: str) -> tuple[Verdict, Path]:
+def verdict(config: BlameCheck, rung: str, name: str = "", size: int = 0) -> tuple[Verdict, Path]:
     """Run the ladder of one stack, and return who lost its trials."""
-    out = config.out / (defect.replace(":", "-") or f"sound-{rung}")
+    out = config.out / (f"{name}-{size}" if name else f"sound-{rung}")
     method = METHODS.get(rung, "visual_servo")
-    use = (f"defect={defect}",) if defect else ()
+    use = (DEFECTS[name].use.replace("SIZE", str(DEFECTS[name].sizes[size - 1])),) if name else ()
     run_ladder(LadderConfig(rung, (method,), config.n, config.profile, config.seed, out, config.j, use))
     blame = BlameConfig((out,), config.only, config.n, config.harm, config.j)
     with closing(make_executor("local", config.j)) as executor:
@@ -80,13 +126,13 @@ def main(config: BlameCheck) -> None:
     rows: list[tuple[str, ...]] = []
     hits = single = lost_by_defect = cells = false = sound = 0
     for rung in dict.fromkeys(DEFECTS[name].rung for name in config.defects):
-        plain, out = verdict(config, rung, "")
+        plain, out = verdict(config, rung)
         base = {record.key: record for record in read_records(out / "trials.jsonl")}
         sound, false = sound + 1, false + bool(plain.proved)
         rows.append(_row(f"none, {rung}", "-", plain))
         for name in (one for one in config.defects if DEFECTS[one].rung == rung):
             for size in config.sizes:
-                found, out = verdict(config, rung, f"{name}:{size}")
+                found, out = verdict(config, rung, name, size)
                 right = DEFECTS[name].right
                 here = [r for r in read_records(out / "trials.jsonl") if not r.success and base[r.key].success]
                 named = sum((r.module or "").partition(":")[0] in SLOTS[right] for r in here)

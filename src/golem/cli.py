@@ -12,7 +12,6 @@ import sys
 import warnings
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, TypeVar
 
 import tyro
@@ -87,11 +86,9 @@ def _blame(words: list[str]) -> int:
     if any(word.partition("=")[0] == "--rung" for word in words):
         from golem.evaluation.harness.ladder import read_ladder, run_ladder
 
-        ladder = run_ladder(read_ladder(words)).config
-        config = BlameConfig((ladder.out or Path(),), j=ladder.j, executor=ladder.executor, limit=ladder.limit)
-    else:
-        config = _parse(BlameConfig, "blame", words)
-    return _exit_code(run_blame(config))
+        ran = run_ladder(read_ladder(words)).config
+        words = [str(ran.out), "-j", str(ran.j), "--executor", ran.executor, "--limit", str(ran.limit)]
+    return _exit_code(run_blame(_parse(BlameConfig, "blame", words)))
 
 
 def _faults(words: list[str]) -> int:

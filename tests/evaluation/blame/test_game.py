@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from golem.evaluation.blame.game import Strata, coalitions, points, shapley
+from golem.evaluation.blame.game import Strata, coalitions, orders_of, points, shapley
 
 
 def test_shares_of_a_known_game_are_shapleys() -> None:
@@ -11,16 +11,17 @@ def test_shares_of_a_known_game_are_shapleys() -> None:
     def worth(who: frozenset[str]) -> float:
         return float("left" in who and bool(who & {"a", "b"}))
 
-    players = ("left", "a", "b")
-    assert shapley(players, [], worth) == pytest.approx({"left": 2 / 3, "a": 1 / 6, "b": 1 / 6})
+    orders = orders_of(("left", "a", "b"), np.random.default_rng(0))
+    assert len(coalitions(orders)) == 8
+    assert shapley(orders, worth) == pytest.approx({"left": 2 / 3, "a": 1 / 6, "b": 1 / 6})
 
 
 def test_drawn_orders_sum_to_the_whole_and_ask_only_for_what_they_drew() -> None:
     rng, players = np.random.default_rng(0), tuple("abcdefgh")
-    chosen, orders = coalitions(players, rng)
-    assert orders and len(chosen) < 2 ** len(players)
-    table = {who: rng.random() for who in chosen}
-    shares = shapley(players, orders, table.__getitem__)
+    orders = orders_of(players, rng)
+    table = {who: rng.random() for who in coalitions(orders)}
+    assert len(table) < 2 ** len(players)
+    shares = shapley(orders, table.__getitem__)
     assert sum(shares.values()) == pytest.approx(table[frozenset(players)] - table[frozenset()])
 
 

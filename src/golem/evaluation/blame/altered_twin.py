@@ -1,20 +1,23 @@
-"""The twin for trials in which a module is exchanged: it shows truth to what stands in for one, or is altered."""
+"""The twin for trials in which a module is exchanged, and the modules that are fed with its truth."""
 
 from __future__ import annotations
 
 import weakref
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from golem.capabilities.odometry.base import Source
+from golem.capabilities.odometry.legs import Legs
 from golem.errors import ConfigError
+from golem.interfaces.lidar import LegOdometry
 from golem.robots.model import magpie_model
 from golem.robots.mujoco.config import MujocoConfig
 from golem.robots.mujoco.engine import MujocoRobot
-from golem.types import LEGS, SIDES, Array
+from golem.types import LEGS, SIDES, Array, BaseEstimate, LowState
 
 KEPT = 100
 """Exposures whose state is kept: a frame is looked at within a second."""
@@ -56,8 +59,7 @@ class AlteredTwin(MujocoRobot):
         super().__init__(profile, seed, posture, config)
         self._held, self._let_go = config.held, False
         self.exposures: deque[tuple[float, Array, Array, Array]] = deque(maxlen=KEPT)
-        pads = [magpie_model.finger_names(side, f)[2] for side in SIDES for f in magpie_model.FINGERS]
-        for pad in pads:
+        for pad in (magpie_model.finger_names(side, f)[2] for side in SIDES for f in magpie_model.FINGERS):
             self._model.geom(pad).friction[0] *= config.grip
         self._memory["motors"]["limit"][..., LEGS] *= config.leg_torque
         AlteredTwin._newest = weakref.ref(self)
@@ -94,3 +96,35 @@ class AlteredTwin(MujocoRobot):
         data = self.data
         self.exposures.append((data.time, data.qpos.copy(), data.mocap_pos.copy(), data.mocap_quat.copy()))
         return super().capture(camera)
+
+
+class TrueBase:
+    """A `BaseEstimator` that knows pose, velocity and contacts of the base."""
+
+    def __init__(self) -> None:
+        """Look into the twin of the trial."""
+        self._truth = AlteredTwin.newest().truth
+
+    def reset(self, state: LowState) -> None:
+        """Forget nothing."""
+
+    def step(self, state: LowState, dt: float) -> BaseEstimate:
+        """Return the truth; see `BaseEstimator`."""
+        return self._truth.estimate(state.t)
+
+
+class TrueOdometry(Legs):
+    """A `LidarOdometry` that knows where the base is."""
+
+    sources: tuple[Source, ...] = ("imu", "legs", "scan")
+
+    def __init__(self) -> None:
+        """Look into the twin of the trial."""
+        super().__init__()
+        self._truth = AlteredTwin.newest().truth
+
+    def add_legs(self, legs: LegOdometry) -> None:
+        """Take the waist from the legs, and the rest from the truth."""
+        true = self._truth.estimate(legs.t)
+        velocity = true.T_odom_base[:3, :3].T @ true.velocity
+        super().add_legs(replace(legs, T_odom_base=true.T_odom_base, velocity=velocity, stale=False))

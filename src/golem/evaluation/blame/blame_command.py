@@ -8,14 +8,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from tyro.conf import Positional, arg
 
 from golem.errors import ConfigError, unknown_name
 from golem.evaluation.base import RUNGS, rung_class
-from golem.evaluation.blame.game import Coalition, Points, Strata, coalitions, points, shapley
+from golem.evaluation.blame.game import EXACT, Coalition, Points, Strata, coalitions, orders_of, points, shapley
 from golem.evaluation.blame.oracles import ORACLES, NotHere
 from golem.evaluation.harness.ladder import LadderConfig, prepare
 from golem.evaluation.harness.records import Provenance, TrialRecord, read_records
@@ -35,7 +35,8 @@ FOLDER = "blame"
 class BlameConfig:
     """Say which modules lost the trials of finished ladder runs, by running the same trials with modules exchanged.
 
-    Trials go to RUN/blame, and are not run twice. Several runs, from the lowest rung up, give an error budget.
+    Trials go to RUN/blame, with blame.json and blame.md, and are not run twice. Several runs, from the lowest rung up,
+    give an error budget.
     """
 
     runs: Positional[tuple[Path, ...]]
@@ -52,8 +53,6 @@ class BlameConfig:
     """As of `golem ladder`."""
     limit: float = 600.0
     """As of `golem ladder` [s]."""
-    json: bool = False
-    """Print the figures as a last line of JSON."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,14 +60,10 @@ class Verdict:
     """What was found of one method of a run.
 
     Attributes:
-        rung, method: of the run.
-        strata: its trials.
-        singles: oracle -> lost trials that it wins, won trials that it loses, and its points.
-        pairs: two oracles -> points, of those that matter.
+        rung, method, strata: of the run.
+        singles: oracle -> lost trials that it wins, won trials that it loses (-1: not looked at), and its points.
+        pairs, shares, total: of the oracles that matter: points of two, Shapley's share, points of all together.
         all_wins: lost trials that are won with everything exchanged.
-        shares: oracle that matters -> Shapley's share.
-        total: points of all that matter, exchanged together.
-        orders: how many orders were drawn; 0 where all coalitions were run.
     """
 
     rung: str
@@ -79,7 +74,6 @@ class Verdict:
     all_wins: int
     shares: dict[str, Points]
     total: Points
-    orders: int
 
     @property
     def first(self) -> str | None:
@@ -93,28 +87,25 @@ class Verdict:
         found = [name for name, (_, _, one) in self.singles.items() if one.proved]
         return sorted(found, key=lambda name: -self.singles[name][2].value)
 
-    def tables(self) -> list[TextTable]:
-        """Return what is printed."""
+    def table(self) -> TextTable:
+        """Return what is printed: what each exchange is worth alone, its share, and what two are worth."""
         s = self.strata
         rate = wilson(s.won / s.alike, s.n / s.alike)
-        head = f"{self.rung}, {self.method}: {s.won} of {s.n} won, {rate.text(100)} %"
         rows = [
-            (name, ORACLES[name].words if name in ORACLES else "", f"{won} of {len(s.lost_run)}",
-             f"{lost} of {len(s.won_run)}" if lost >= 0 else "-", *_cells(one), "yes" if one.proved else "")
-            for name, (won, lost, one) in sorted(self.singles.items(), key=lambda row: -row[1][2].value)
+            (name, ORACLES[name].words, f"{won} of {len(s.lost_run)}",
+             f"{lost} of {len(s.won_run)}" if lost >= 0 else "-",
+             *_cells(one), "yes" if one.proved else "", *_cells(self.shares.get(name)))
+            for name, (won, lost, one) in self.singles.items()
         ]  # fmt: skip
-        columns = ("exchanged", "for", "lost trials won", "won trials lost", "points", "95 %", "proved")
-        found = [TextTable(f"{head}: one module exchanged", columns, tuple(rows), self._words())]
-        if self.shares:
-            shares = sorted(self.shares.items(), key=lambda row: -row[1].value)
-            rows = [(name, *_cells(one)) for name, one in (*shares, ("together", self.total))]
-            how = f"{self.orders} orders drawn" if self.orders else "all coalitions"
-            found.append(TextTable(f"{head}: Shapley's shares ({how})", ("module", "points", "95 %"), tuple(rows)))
-        if self.pairs:
-            best = sorted(self.pairs.items(), key=lambda row: -row[1].value)
-            rows = [(name, *_cells(one)) for name, one in best]
-            found.append(TextTable(f"{head}: two exchanged", ("modules", "points", "95 %"), tuple(rows)))
-        return found
+        pairs = {**self.pairs, "all of a share above": self.total} if self.shares else {}
+        rows += [(name, "", "", "", *_cells(one), "", "", "") for name, one in pairs.items()]
+        how = "orders drawn" if len(self.shares) > EXACT else "all coalitions run"
+        return TextTable(
+            f"{self.rung}, {self.method}: {s.won} of {s.n} won, {rate.text(100)} %",
+            ("exchanged", "for", "lost won", "won lost", "points", "95 %", "proved", f"share ({how})", "95 %"),
+            tuple(rows),
+            self._words(),
+        )
 
     def _words(self) -> str:
         """Return what buys the most, and what nothing here buys."""
@@ -122,13 +113,12 @@ class Verdict:
         rest = f"With everything exchanged {left} of {len(self.strata.lost_run)} lost trials are lost all the same."
         if not self.proved:
             return f"No module is proved to lose trials (95 % for all {len(self.singles)} together). {rest}"
-        best = self.proved[0]
-        text = self.singles[best][2].interval.text(100)
-        return f"A better {best} buys the most: {text} points. {rest}"
+        span = self.singles[self.proved[0]][2].interval.text(100)
+        return f"A better {self.proved[0]} buys the most: {span} points. {rest}"
 
 
-def _cells(one: Points) -> tuple[str, str]:
-    return f"{100 * one.value:+.1f}", one.interval.text(100, "+")
+def _cells(one: Points | None) -> tuple[str, str]:
+    return ("", "") if one is None else (f"{100 * one.value:+.1f}", one.interval.text(100, "+"))
 
 
 class Trials:
@@ -141,14 +131,11 @@ class Trials:
         self._config = config
         self._asked: dict[Coalition, tuple[Request, Provenance]] = {}
         self.won: dict[Coalition, dict[Key, bool]] = {frozenset(): {r.key: r.success for r in records}}
-        request, provenance = self._prepare(frozenset())
+        (request, now), first = self._prepare(frozenset()), self._first
         if request.rung.adaptive:
             raise ConfigError(f"Rung {request.rung.name} searches levels; golem blame takes rungs with fixed trials.")
-        first = self._first
-        if (first.code, dict(first.versions)) != (provenance.code, dict(provenance.versions)):
-            raise ConfigError(
-                f"{run} was run by other code or packages, commit {first.commit}; run golem ladder again with this one."
-            )
+        if (first.code, dict(first.versions)) != (now.code, dict(now.versions)):
+            raise ConfigError(f"{run} was run by other code or packages, commit {first.commit}; run its ladder again.")
 
     def _prepare(self, exchanged: Coalition) -> tuple[Request, Provenance]:
         if exchanged not in self._asked:
@@ -183,8 +170,7 @@ class Trials:
         """Run the trials `keys` with oracles in the place of what is `exchanged`, unless they were."""
         if not exchanged:
             return
-        request, provenance = self._prepare(exchanged)
-        only = frozenset(keys)
+        (request, provenance), only = self._prepare(exchanged), frozenset(keys)
         request = replace(request, only=only)
         with RunFolder(self._run / FOLDER / name_of(exchanged)) as folder:
             held = folder.resume(request.example, provenance)
@@ -210,15 +196,14 @@ def judge(trials: Trials, method: str, names: Sequence[str], config: BlameConfig
     base = {key: won for key, won in trials.won[frozenset()].items() if key[0] == method}
     lost, won = ([key for key, success in base.items() if success is flag] for flag in (False, True))
     alike = max(sum(other[2] == key[2] for other in base) for key in base)
-    strata = Strata(len(lost), len(won), tuple(lost[: config.n]), tuple(_spread(won, config.harm)), alike)
-    keys: list[Key] = [*lost[: config.n], *_spread(won, config.harm)]
+    again, harmed = lost[: config.n], won[:: max(1, -(-len(won) // max(config.harm, 1)))] if config.harm else []
+    strata, keys = Strata(len(lost), len(won), tuple(again), tuple(harmed), alike), [*again, *harmed]
     run, everything = trials.run, frozenset(names)
-    run(everything, lost[: config.n])
-    for name in names:
-        run(frozenset([name]), lost[: config.n])
+    for who in (everything, *(frozenset([name]) for name in names)):
+        run(who, again)
 
     def wins(who: Coalition) -> list[Key]:
-        return [key for key in lost[: config.n] if trials.won[who][key]]
+        return [key for key in again if trials.won[who][key]]
 
     alone = {name: wins(frozenset([name])) for name in names}
     matter = [name for name in names if alone[name]]
@@ -229,35 +214,24 @@ def judge(trials: Trials, method: str, names: Sequence[str], config: BlameConfig
             run(rest, jointly)
             if name not in matter and not all(trials.won[rest][key] for key in jointly):
                 matter.append(name)
-    chosen, orders = coalitions(matter, np.random.default_rng(0))
-    for who in chosen:
+    orders = orders_of(matter, np.random.default_rng(0))
+    chosen = coalitions(orders)
+    for who in (*chosen, *(frozenset([name]) for name in matter)):
         run(who, keys)
 
-    def value(who: Coalition, key: Key) -> float:
-        return float(trials.won[who][key])
-
     def effect(who: Coalition, compared: int = 1) -> Points:
-        return points(strata, {key: value(who, key) - float(base[key]) for key in keys}, compared)
+        return points(strata, {key: float(trials.won[who][key]) - float(base[key]) for key in keys}, compared)
 
     singles: dict[str, tuple[int, int, Points]] = {}
     for name in names:
-        who = frozenset([name])
-        if name in matter and who in chosen:
-            losses = sum(not trials.won[who][key] for key in strata.won_run)  # pyright: ignore[reportArgumentType]
-            singles[name] = len(alone[name]), losses, effect(who, len(names))
-        else:
-            only = replace(strata, won_run=())
-            singles[name] = 0, -1, points(only, dict.fromkeys(lost, 0.0), len(names))
-    each = {key: shapley(matter, orders, lambda who, key=key: value(who, key)) for key in keys}
+        who, nothing = frozenset([name]), points(replace(strata, won_run=()), dict.fromkeys(again, 0.0), len(names))
+        losses = sum(not trials.won[who].get(key, True) for key in won) if name in matter else -1
+        singles[name] = len(alone[name]), losses, effect(who, len(names)) if name in matter else nothing
+    each = {key: shapley(orders, lambda who, key=key: float(trials.won[who][key])) for key in keys}
     shares = {name: points(strata, {key: each[key][name] for key in keys}) for name in matter}
     pairs = {name_of(who): effect(who) for who in chosen if len(who) == 2}
     total = effect(frozenset(matter))
-    return Verdict(rung, method, strata, singles, pairs, len(wins(everything)), shares, total, len(orders))
-
-
-def _spread(keys: list[Key], most: int) -> list[Key]:
-    """Return up to `most` of `keys`, evenly spread."""
-    return keys if len(keys) <= most else [keys[k * len(keys) // most] for k in range(most)]
+    return Verdict(rung, method, strata, singles, pairs, len(wins(everything)), shares, total)
 
 
 def run_blame(config: BlameConfig) -> int:
@@ -283,27 +257,15 @@ def run_blame(config: BlameConfig) -> int:
                 raise ConfigError(f"{run}: no oracle exchanges anything there.")
             found = [judge(trials, m, names, config, records[0].rung) for m in dict.fromkeys(r.method for r in records)]
             verdicts += found
-            text = "\n\n".join(table.markdown() for verdict in found for table in verdict.tables())
+            text = "\n\n".join(verdict.table().markdown() for verdict in found)
             write_file(run / FOLDER / "blame.md", text + "\n")
-            write_file(run / FOLDER / "blame.json", figures(found) + "\n")
-    tables = [table for verdict in verdicts for table in verdict.tables()]
+            rows = [{**asdict(one), "first": one.first, "proved": one.proved} for one in found]
+            write_file(run / FOLDER / "blame.json", json.dumps(rows) + "\n")
+    tables = [verdict.table() for verdict in verdicts]
     if len(config.runs) > 1:
         tables.append(budget(verdicts))
     print("\n\n".join(table.terminal() for table in tables))
-    if config.json:
-        print(figures(verdicts))
     return len(verdicts)
-
-
-def figures(verdicts: Sequence[Verdict]) -> str:
-    """Return verdicts as one line of JSON, without the names of their trials."""
-    rows: list[dict[str, Any]] = []
-    for one in verdicts:
-        row = asdict(one)
-        strata = row.pop("strata")
-        counts = {"lost_run": len(one.strata.lost_run), "won_run": len(one.strata.won_run)}
-        rows.append({**row, **strata, **counts, "first": one.first, "proved": one.proved})
-    return json.dumps(rows)
 
 
 def budget(verdicts: Sequence[Verdict]) -> TextTable:
@@ -314,9 +276,8 @@ def budget(verdicts: Sequence[Verdict]) -> TextTable:
         before: Mapping[str, float] = {}
         for one in (v for v in verdicts if v.method == method):
             s, now = one.strata, {name: p.value for name, p in one.shares.items()}
-            cells = [
-                f"{100 * now.get(n, 0.0):.1f} ({100 * (now.get(n, 0.0) - before.get(n, 0.0)):+.1f})" for n in names
-            ]
+            lost = [(100.0 * now.get(name, 0.0), 100.0 * before.get(name, 0.0)) for name in names]
+            cells = [f"{here:.1f} ({here - there:+.1f})" for here, there in lost]
             rest = (s.n - s.won) / s.n - one.total.value
             rate = f"{100 * s.won / s.n:.1f} {wilson(s.won / s.alike, s.n / s.alike).text(100)}"
             rows.append((method, one.rung, rate, *cells, f"{100 * rest:.1f}"))

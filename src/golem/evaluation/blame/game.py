@@ -13,7 +13,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import permutations
+from typing import Any
 
 import numpy as np
 
@@ -32,14 +33,14 @@ class Strata:
 
     Attributes:
         lost, won: how many there are.
-        lost_run, won_run: keys of those that are run again.
+        lost_run, won_run: keys (method, case, index) of those that are run again.
         alike: trials that share a scene, and count as one in intervals.
     """
 
     lost: int
     won: int
-    lost_run: tuple[object, ...]
-    won_run: tuple[object, ...]
+    lost_run: tuple[Any, ...]
+    won_run: tuple[Any, ...]
     alike: int = 1
 
     @property
@@ -57,7 +58,7 @@ class Points:
     proved: bool
 
 
-def points(strata: Strata, gains: Mapping[object, float], compared: int = 1) -> Points:
+def points(strata: Strata, gains: Mapping[Any, float], compared: int = 1) -> Points:
     """Return the points of what changes each trial's success by `gains` (-1 to 1), by key.
 
     Args:
@@ -97,35 +98,27 @@ def _mover(cells: Sequence[tuple[float, float]], level: float) -> Interval:
     return Interval(max(low, -1.0), min(p - q + reach(ends[0].high - p, q - ends[1].low), 1.0))
 
 
-def coalitions(players: Sequence[str], rng: np.random.Generator) -> tuple[list[Coalition], list[tuple[str, ...]]]:
-    """Return the coalitions that are to be run, and the orders that were drawn; none where all coalitions are."""
+def orders_of(players: Sequence[str], rng: np.random.Generator) -> list[tuple[str, ...]]:
+    """Return the orders over which Shapley's shares are a mean: all of up to `EXACT` players, else `ORDERS` drawn."""
     if len(players) <= EXACT:
-        return [frozenset(c) for k in range(len(players) + 1) for c in combinations(players, k)], []
-    orders: list[tuple[str, ...]] = []
-    for _ in range(ORDERS // 2):
-        drawn = tuple(str(name) for name in rng.permutation(list(players)))
-        orders += [drawn, drawn[::-1]]
-    return list(dict.fromkeys(frozenset(o[:k]) for o in orders for k in range(len(o) + 1))), orders
+        return list(permutations(players))
+    drawn = [tuple(str(name) for name in rng.permutation(list(players))) for _ in range(ORDERS // 2)]
+    return [order for one in drawn for order in (one, one[::-1])]
 
 
-def shapley(
-    players: Sequence[str], orders: Sequence[tuple[str, ...]], value: Callable[[Coalition], float]
-) -> dict[str, float]:
-    """Return Shapley's share of each player (Shapley 1953); of drawn `orders` the mean (Castro et al. 2009).
+def coalitions(orders: Sequence[tuple[str, ...]]) -> list[Coalition]:
+    """Return the coalitions that `orders` need, small ones first."""
+    found = dict.fromkeys(frozenset(order[:k]) for order in orders for k in range(len(order) + 1))
+    return sorted(found, key=lambda who: (len(who), sorted(who)))
+
+
+def shapley(orders: Sequence[tuple[str, ...]], value: Callable[[Coalition], float]) -> dict[str, float]:
+    """Return Shapley's share of each player (1953): the mean of what it adds in `orders` (drawn: Castro et al. 2009).
 
     The shares sum to the value of all players less that of none.
     """
-    share = dict.fromkeys(players, 0.0)
+    share = dict.fromkeys(orders[0], 0.0)
     for order in orders:
         for k, name in enumerate(order):
             share[name] += (value(frozenset(order[: k + 1])) - value(frozenset(order[:k]))) / len(orders)
-    if orders:
-        return share
-    n = len(players)
-    for name in players:
-        others = [one for one in players if one != name]
-        for k in range(n):
-            weight = 1.0 / (n * math.comb(n - 1, k))
-            for chosen in combinations(others, k):
-                share[name] += weight * (value(frozenset((*chosen, name))) - value(frozenset(chosen)))
     return share

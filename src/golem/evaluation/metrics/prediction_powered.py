@@ -27,14 +27,7 @@ FEWEST = 10
 
 @dataclass(frozen=True, slots=True)
 class Powered:
-    """A success rate by real and simulated trials.
-
-    Attributes:
-        rate, interval: with its 95 % interval.
-        real: the interval of the real trials alone.
-        weight: lambda.
-        worth: real trials that it is worth.
-    """
+    """A success rate with its 95 % interval, that of the real trials alone, lambda, and how many real ones it is worth."""
 
     rate: float
     interval: Interval

@@ -2,24 +2,32 @@
 
 from __future__ import annotations
 
+import csv
+import io
 from collections.abc import Sequence
 from dataclasses import dataclass
+from importlib.resources import files
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 from tyro.conf import Positional, arg
 
-from golem.errors import ConfigError
-from golem.evaluation.base import case_name
+from golem.errors import ConfigError, unknown_name
+from golem.evaluation.base import RUNGS, case_name, make_rung
 from golem.evaluation.harness.records import TrialRecord, read_records
 from golem.evaluation.metrics.metric_names import metric
 from golem.evaluation.metrics.prediction_powered import prediction_powered
+from golem.evaluation.metrics.published import GGX_F
 from golem.evaluation.metrics.statistics import Interval, wilson
 from golem.evaluation.metrics.text_table import TextTable, short_names
-from golem.evaluation.real.real_trials import SUCCESS, RealRow, data_text, read_real
+from golem.finite import check_finite
+from golem.options import fill, read_yaml
 from golem.output_file import write_file
 
+COLUMNS = ("rung", "method", "case", "metric", "stat", "n", "value", "sd", "index", "source")
+NEEDED = ("rung", "method", "metric", "stat", "value")
+SUCCESS, NO_TWIN = "success", "no trials of the twin"
 DRAWS = 4000
 """Samples of a bootstrap."""
 
@@ -36,18 +44,103 @@ class RealConfig:
     """Write a CSV to begin with to this file, and do nothing else."""
 
 
+@dataclass(frozen=True, slots=True)
+class RealRow:
+    """One line of the CSV.
+
+    Attributes:
+        rung, method, case: the cell, as a ladder names it; an empty case is all cases.
+        metric: `success`, or a figure of the ladder's records [SI units].
+        stat: `count`: `value` of `n` trials were won; `trial`: one was (1) or was not (0); `mean` or `median` of `n`.
+        value, n, sd: the figure, how many trials, and the standard deviation of a mean; None where nobody says.
+        index: of the twin's trial that a `trial` repeats; None where it repeats none.
+        source: in words.
+    """
+
+    rung: str
+    method: str
+    metric: str
+    stat: Literal["count", "trial", "mean", "median"]
+    value: float
+    n: int
+    sd: float | None = None
+    case: str = ""
+    index: int | None = None
+    source: str = ""
+
+    @property
+    def cell(self) -> tuple[str, str, str]:
+        """Rung, method and case."""
+        return self.rung, self.method, self.case
+
+    def problem(self) -> str:
+        """Return what cannot be; empty where all can."""
+        success, counted = self.metric == SUCCESS, self.stat in ("count", "trial")
+        if success != counted:
+            valid = "count or trial" if success else "mean or median"
+            return f"the stat of '{self.metric}' is {valid}, not '{self.stat}'"
+        if not 1 <= self.n <= 10**6 or (self.index or 0) < 0:
+            return "n is a number from 1 to a million, and an index none below 0"
+        if success and not (float(self.value).is_integer() and 0 <= self.value <= self.n):
+            return f"{self.value:g} of {self.n} successes cannot be; that is a whole number from 0 to {self.n}"
+        if self.sd is not None and (self.stat != "mean" or self.n < 2 or self.sd <= 0.0):
+            return "an sd is above 0, and of a mean of two trials or more"
+        return "only a trial has an index" if self.index is not None and self.stat != "trial" else ""
+
+
+def read_real(path: str) -> list[RealRow]:
+    """Read a CSV; `paper` is the paper's own rows.
+
+    Raises:
+        ConfigError: it cannot be read, lacks a column, or a line says what cannot be; names the line.
+    """
+    try:
+        text = _shipped(path) if path == "paper" else Path(path).read_text(encoding="utf-8-sig")
+        lines = list(csv.DictReader(io.StringIO(text, newline=""), restkey="", restval="", strict=True))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise ConfigError(f"{path} cannot be read as CSV: {error}.") from error
+    if not lines:
+        raise ConfigError(f"{path} has no line of trials; golem real --template FILE writes one to begin with.")
+    for name in NEEDED:
+        if name not in lines[0]:
+            raise ConfigError(f"{path} lacks the column {name}; columns: {', '.join(COLUMNS)}.")
+    return [_row(f"line {k} of {path}", line) for k, line in enumerate(lines, start=2)]
+
+
+def _row(where: str, line: dict[str, str]) -> RealRow:
+    if "" in line:
+        raise ConfigError(f"In {where} are more cells than columns.")
+    cells = {name: text.strip() for name, text in line.items() if text.strip()}
+    numbers = ("n", "value", "sd", "index")
+    values = {name: read_yaml(text, where) if name in numbers else text for name, text in cells.items()}
+    values = {"n": 1, **values} if cells.get("stat") == "trial" else values
+    row: RealRow = fill(f"column in {where}", RealRow, values)
+    check_finite(f"the value in {where}", np.array([row.value, row.sd or 0.0]))
+    if row.rung not in RUNGS:
+        raise unknown_name(f"rung in {where}", row.rung, RUNGS)
+    methods = make_rung(RUNGS[row.rung]).methods()
+    if row.method not in (*methods, "GGX-F") and ":" not in row.method and not row.method.startswith("{"):
+        raise unknown_name(f"method in {where}", row.method, methods)
+    if problem := row.problem():
+        raise ConfigError(f"In {where}, {problem}.")
+    return row
+
+
+def _shipped(name: str) -> str:
+    return (files(__package__ or "") / f"{name}.csv").read_text(encoding="utf-8")
+
+
 def run_real(config: RealConfig) -> int:
-    """Print the tables; returns how many rows had trials of the twin.
+    """Print the table; returns how many rows there are.
 
     Raises:
         ConfigError: the CSV or a folder is none.
         golem.errors.OutputError: records cannot be read, or the template not be written.
     """
     if config.template is not None:
-        print(f"Wrote {write_file(config.template, data_text('template'))}.")
+        print(f"Wrote {write_file(config.template, _shipped('template'))}.")
         return 1
-    rows = read_real(config.file)
-    twins: list[TrialRecord] = []
+    rows, twins = read_real(config.file), list[TrialRecord]()
     for run in config.runs:
         found = read_records(run / "trials.jsonl")
         if not found:
@@ -56,36 +149,23 @@ def run_real(config: RealConfig) -> int:
     profiles = sorted({record.profile for record in twins})
     if len(profiles) > 1:
         raise ConfigError(f"The runs are of the profiles {' and '.join(profiles)}; give those of one.")
-    lines = [_compared(row, rows, _cell(row, twins)) for row in _pooled(rows)]
+    singles = {row.cell: [r for r in rows if r.stat == "trial" and r.cell == row.cell] for row in rows}
+    cells = [row for row in rows if row.stat != "trial"]
+    for mine in filter(None, singles.values()):
+        one = mine[0]
+        cells.append(
+            RealRow(one.rung, one.method, SUCCESS, "count", sum(r.value for r in mine), len(mine), case=one.case)
+        )
+    lines = [compared(row, singles[row.cell], twins) for row in cells]
     columns = ("rung", "method", "case", "figure", "real", "twin", "predicted", "verdict", "real rate [%]", "with twin")
-    title = f"Real trials and the twin's, profile {''.join(profiles) or '-'}"
     note = (
         "Predicted: what 95 % of such real samples would show if they were the twin's. Successes: beta-binomial after "
-        "the twin's trials, Jeffreys' prior. Means: Student's t; with an sd, Welch's. Medians: bootstrap. "
-        "With twin: prediction-powered (PPI++), and how many real trials it is worth; the twin helps where every real "
-        "trial is a line of its own with the index of the twin's trial that it repeats."
+        "the twin's trials, Jeffreys' prior. Means: Student's t. Medians: bootstrap. With twin: the real rate by both "
+        "(PPI++), and how many real trials that is worth, where every real trial repeats one of the twin's."
     )
+    title = f"Real trials and the twin's, profile {''.join(profiles) or '-'}"
     print(TextTable(title, columns, tuple(lines), note).terminal())
-    return sum(line[-1] != NO_TWIN for line in lines) or 1
-
-
-NO_TWIN, SINGLE = "no trials of the twin", "single trials"
-
-
-def _pooled(rows: Sequence[RealRow]) -> list[RealRow]:
-    """Return rows with single trials of a cell counted together."""
-    found = [row for row in rows if row.stat != "trial"]
-    cells = dict.fromkeys((r.rung, r.method, r.case) for r in rows if r.stat == "trial")
-    for cell in cells:
-        mine = [r.value for r in rows if r.stat == "trial" and (r.rung, r.method, r.case) == cell]
-        found.append(RealRow(*cell, SUCCESS, "count", len(mine), sum(mine), None, None, SINGLE))
-    return found
-
-
-def _cell(row: RealRow, twins: Sequence[TrialRecord]) -> list[TrialRecord]:
-    """Return the twin's trials of the cell of a row."""
-    same = [r for r in twins if (r.rung, r.method) == (row.rung, row.method)]
-    return [r for r in same if row.case in ("", case_name(r.case))]
+    return len(lines)
 
 
 def predicted(row: RealRow, twin: Sequence[float]) -> Interval | None:
@@ -100,24 +180,23 @@ def predicted(row: RealRow, twin: Sequence[float]) -> Interval | None:
 
     x, n, size = np.asarray(twin, float), row.n, len(twin)
     if row.stat == "count":
-        won = float(x.sum())
-        low, high = betabinom.interval(0.95, n, won + 0.5, size - won + 0.5)
+        low, high = betabinom.interval(0.95, n, x.sum() + 0.5, size - x.sum() + 0.5)
         return Interval(float(low), float(high))
     if size < 2:
         return None
     if row.stat == "median":
         drawn = np.median(np.random.default_rng(0).choice(x, (DRAWS, n)), axis=1)
         return Interval(*np.quantile(drawn, (0.025, 0.975)).tolist())
-    mine, its = float(x.var(ddof=1)) / size, float(x.var(ddof=1) if row.sd is None else row.sd**2) / n
-    free = size - 1.0
-    if row.sd is not None and mine + its > 0.0:
-        free = (mine + its) ** 2 / (mine**2 / (size - 1) + its**2 / (n - 1))
-    half = float(student.ppf(0.975, free)) * float(np.sqrt(mine + its))
-    return Interval(float(x.mean()) - half, float(x.mean()) + half)
+    # With an sd of the real trials, the lesser degrees of freedom: no less than Welch's.
+    real, free = (x.var(ddof=1), size - 1) if row.sd is None else (row.sd**2, min(size, n) - 1)
+    half = student.ppf(0.975, free) * np.sqrt(x.var(ddof=1) / size + real / n)
+    return Interval(float(x.mean() - half), float(x.mean() + half))
 
 
-def _compared(row: RealRow, rows: Sequence[RealRow], twin: Sequence[TrialRecord]) -> tuple[str, ...]:
-    """Return the line of one row."""
+def compared(row: RealRow, singles: Sequence[RealRow], twins: Sequence[TrialRecord]) -> tuple[str, ...]:
+    """Return the line of one row, whose single trials are `singles`."""
+    method = GGX_F if row.method == "GGX-F" else row.method
+    twin = [r for r in twins if (r.rung, r.method) == (row.rung, method) and row.case in ("", case_name(r.case))]
     shown, count = metric(row.metric), row.stat == "count"
     values = [float(r.success) if count else r.series.get(row.metric, r.timings.get(row.metric)) for r in twin]
     known = [value for value in values if value is not None]
@@ -131,16 +210,10 @@ def _compared(row: RealRow, rows: Sequence[RealRow], twin: Sequence[TrialRecord]
     middle = np.median(known) if row.stat == "median" else np.mean(known)
     its = f"{sum(known):g} of {len(known)}" if count else f"{shown.scale * middle:.3g}, n = {len(known)}"
     verdict = "below the twin" if row.value < span.low else "above the twin" if row.value > span.high else "predicted"
-    return (*head, its, span.text(1.0 if count else shown.scale), verdict, rate, _powered(row, rows, twin))
-
-
-def _powered(row: RealRow, rows: Sequence[RealRow], twin: Sequence[TrialRecord]) -> str:
-    """Return the real success by real and simulated trials, where every real one repeats one of the twin's."""
-    said = {r.index: float(r.success) for r in twin}
-    single = [r for r in rows if r.stat == "trial" and (r.rung, r.method, r.case) == (row.rung, row.method, row.case)]
-    if row.source != SINGLE or len(said) < len(twin) or any(r.index not in said for r in single):
-        return "-"
-    taken = [r.index for r in single if r.index is not None]
-    others = [value for index, value in said.items() if index not in taken]
-    found = prediction_powered([r.value for r in single], [said[index] for index in taken], others)
-    return f"{found.interval.text(100)}, {found.worth:.0f}"
+    both, said = "-", {r.index: float(r.success) for r in twin}
+    if count and row.n == len(singles) and len(said) == len(twin) and all(r.index in said for r in singles):
+        taken = [r.index for r in singles if r.index is not None]
+        others = [value for index, value in said.items() if index not in taken]
+        powered = prediction_powered([r.value for r in singles], [said[index] for index in taken], others)
+        both = f"{powered.interval.text(100)}, {powered.worth:.0f}"
+    return (*head, its, span.text(1.0 if count else shown.scale), verdict, rate, both)
