@@ -11,8 +11,10 @@ import sys
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import tyro
+from tyro.conf import arg
 
 from golem.errors import unknown_name
 from golem.evaluation.blame.blame_command import BlameConfig, Trials, Verdict, judge
@@ -92,7 +94,7 @@ class BlameCheck:
     """Which."""
     sizes: tuple[int, ...] = (1, 2, 3, 4, 5)
     """Of each, from 1 (small) to 5."""
-    n: int = 50
+    n: Annotated[int, arg(aliases=("-n",))] = 50
     """Trials of each."""
     harm: int = 20
     """As of golem blame."""
@@ -102,7 +104,7 @@ class BlameCheck:
     """Realism profile."""
     seed: int = 0
     """Of the trials."""
-    j: int = 1
+    j: Annotated[int, arg(aliases=("-j",))] = 1
     """Processes."""
 
 

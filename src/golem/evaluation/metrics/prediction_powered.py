@@ -27,7 +27,7 @@ FEWEST = 10
 
 @dataclass(frozen=True, slots=True)
 class Powered:
-    """A success rate with its 95 % interval, that of the real trials alone, lambda, and how many real ones it is worth."""
+    """A rate with its 95 % interval, that of the real trials alone, lambda, and how many real ones it is worth."""
 
     rate: float
     interval: Interval

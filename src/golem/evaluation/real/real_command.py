@@ -115,7 +115,7 @@ def _row(where: str, line: dict[str, str]) -> RealRow:
     values = {name: read_yaml(text, where) if name in numbers else text for name, text in cells.items()}
     values = {"n": 1, **values} if cells.get("stat") == "trial" else values
     row: RealRow = fill(f"column in {where}", RealRow, values)
-    check_finite(f"the value in {where}", np.array([row.value, row.sd or 0.0]))
+    check_finite(f"The value in {where}", np.array([row.value, row.sd or 0.0]))
     if row.rung not in RUNGS:
         raise unknown_name(f"rung in {where}", row.rung, RUNGS)
     methods = make_rung(RUNGS[row.rung]).methods()
