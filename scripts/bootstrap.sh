@@ -91,7 +91,7 @@ find_uv "$python"
 if ! "$venv/bin/python" -c 'import sys' 2> /dev/null; then
     "$uv" venv --quiet --clear --python "$python" "$venv"
 fi
-echo "golem: installing the locked packages (${locks[*]}) into $venv; core alone takes 1 GB of disk and some minutes" >&2
+echo "golem: installing the locked packages (${locks[*]}) into $venv; core alone takes 0.8 GB of disk and some minutes" >&2
 for group in "${locks[@]}"; do
     "$uv" pip install $quiet --python "$venv/bin/python" --no-deps --require-hashes -r "requirements/$group.txt"
 done

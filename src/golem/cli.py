@@ -201,10 +201,7 @@ def _skill(words: list[str]) -> int:
 
 
 def _check(words: list[str]) -> int:
-    """Check modules against their contracts: `check`, `check SLOT [USE]`.
-
-    `check policy FILE`: a trainer's leg policy.
-    """
+    """Check modules against their contracts: `check [SLOT [USE]]`; `check policy FILE`: a trainer's leg policy."""
     if words[:1] == ["policy"]:
         from golem.evaluation.passport.policy_command import PolicyCheckConfig, run_policy_check
 
@@ -341,7 +338,7 @@ def _dispatch(words: list[str]) -> int:
     if not words or words[0] in ("-h", "--help"):
         print("usage: golem COMMAND [options]     (golem COMMAND --help lists the options)\n")
         for name, command in COMMANDS.items():
-            print(f"  {name:8s} {command.__doc__}")
+            print(f"  {name:9s} {command.__doc__}")
         return 0 if words else BAD_INPUT
     if words[0] == "--version":
         from golem import __version__
