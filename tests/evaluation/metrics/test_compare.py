@@ -67,3 +67,11 @@ def test_whatever_else_differs_is_said(runs: tuple[Path, Path], capsys: pytest.C
     run_compare(CompareConfig(first, second))
     said = capsys.readouterr().out
     assert "different --use: none and servo=mine" in said and "different versions of numpy" in said
+
+
+def test_runs_of_different_code_are_no_comparison(runs: tuple[Path, Path]) -> None:
+    first, second = runs
+    path = second / "trials.jsonl"
+    path.write_text("".join(replace(r, code="0", commit="older").line() for r in read_records(path)))
+    with pytest.raises(ConfigError, match="are of different code, commits .* and older; measure one of them again"):
+        run_compare(CompareConfig(first, second))

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from scipy.stats import binom, binomtest, norm
 
 from golem.evaluation.metrics.statistics import (
+    Interval,
     PairedTable,
     clustered,
     distribution,
@@ -135,14 +136,19 @@ def test_the_interval_of_a_mean_is_cut_at_what_can_be() -> None:
     free, cut = mean_interval(forces), mean_interval(forces, 0.0)
     assert free is not None and cut is not None
     assert free.low < -70.0 and (cut.low, cut.high) == (0.0, free.high)
-    shares = mean_interval([0.5, 1.0, 1.0, 0.9], 0.0, 1.0)
-    assert shares is not None and shares.high == 1.0 and shares.low > 0.4
 
 
 def test_a_share_of_yes_and_no_has_wilsons_interval() -> None:
     assert mean_interval([1.0, 1.0], 0.0, 1.0) == wilson(2, 2)
     assert mean_interval([1.0, 0.0, 1.0], 0.0, 1.0) == wilson(2, 3)
-    assert mean_interval([0.5, 0.5], 0.0, 1.0) is None, "values that are alike do not say how they spread"
+
+
+def test_other_shares_have_an_interval_that_assumes_no_distribution() -> None:
+    assert mean_interval([0.5, 0.5], 0.0, 1.0) == Interval(0.0, 1.0), "two values say nothing"
+    found = mean_interval([0.5, 1.0, 1.0, 0.9] * 10, 0.0, 1.0)
+    assert found is not None and 0.6 < found.low < 0.85 < found.high < 1.0
+    apart = mean_interval([0.5, 0.4, 0.6, 0.5] * 10, -1.0, 1.0)
+    assert apart is not None and 0.0 < apart.low < 0.5 < apart.high < 1.0
 
 
 @pytest.mark.parametrize("n, k", [(30, 27), (300, 300), (10, 0), (54, 42)])

@@ -14,6 +14,7 @@ import pytest
 torch = pytest.importorskip("torch", reason="training needs the extra 'train'")
 
 from golem.capabilities.perception.onnx_detector import OnnxDetector, OnnxDetectorConfig  # noqa: E402
+from golem.training.detector.dataset import Dataset  # noqa: E402
 from golem.training.detector.evaluate import draw_curve  # noqa: E402
 from golem.training.detector.export_detector import export_onnx  # noqa: E402
 from golem.training.detector.labels import CLASSES  # noqa: E402
@@ -21,6 +22,7 @@ from golem.training.detector.part_net import PartNet  # noqa: E402
 from golem.training.detector.train_detector import (  # noqa: E402
     TrainDetectorConfig,
     load_onnx,  # noqa: E402
+    set_apart,  # noqa: E402
     train,
 )
 
@@ -102,3 +104,14 @@ def test_the_curve_of_the_shipped_weights_reaches_their_step() -> None:
     facts = {p.key: json.loads(p.value) for p in onnx.load_model_from_string(file.read_bytes()).metadata_props}
     curve = Path(__file__).parents[3] / "docs" / "images" / "detector_curve.csv"
     assert str(facts["step"]) in [row.split(",")[0] for row in curve.read_text().splitlines()]
+
+
+@pytest.mark.parametrize("n", [1, 2, 4, 37, 700])
+def test_a_checkpoint_is_chosen_on_images_that_do_not_train(n: int) -> None:
+    images = [np.full((1, 1, 3), k % 256, np.uint8) for k in range(n)]
+    data = Dataset(images, [np.zeros((0, 8))] * n, ["own"] * n, [{}] * n)
+    train_on, choice = set_apart(data, 80)
+    assert 1 <= len(choice.images) <= max(1, min(80, n // 10))
+    seen = {id(image) for image in train_on.images}
+    assert n == 1 or not any(id(image) in seen for image in choice.images)
+    assert n == 1 or len(train_on.images) + len(choice.images) == n

@@ -47,6 +47,10 @@ def run_compare(config: CompareConfig) -> Summary:
             raise ConfigError(
                 f"{rungs} have different {name}s ({one} and {other}); trials are paired by seed, index and profile."
             )
+    if a[0].code != b[0].code:
+        raise ConfigError(
+            f"{rungs} are of different code, commits {a[0].commit} and {b[0].commit}; measure one of them again."
+        )
     if a[0].rung != b[0].rung:
         print(f"{rungs.removesuffix(', and')}: the same draws in two tasks, trial by trial.")
     for difference in _differences(a[0], b[0]):
@@ -76,8 +80,6 @@ def _named(side: Mapping[Key, TrialRecord], keys: Sequence[Key], name: str) -> l
 def _differences(a: TrialRecord, b: TrialRecord) -> list[str]:
     """Return what else differs between two runs, which must not be taken for an effect of the rung or the method."""
     found: list[str] = []
-    if a.code != b.code:
-        found.append(f"The runs are of different code, commits {a.commit} and {b.commit}.")
     if a.overrides != b.overrides:
         sides = (" ".join(f"{k}={v}" for k, v in r.overrides.items()) or "none" for r in (a, b))
         found.append(f"The runs have different --use: {' and '.join(sides)}.")

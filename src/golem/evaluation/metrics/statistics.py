@@ -181,13 +181,19 @@ def mean_interval(
 ) -> Interval | None:
     """Return the interval of the mean of `values`, which must lie between `low` and `high`.
 
-    Of values that are each 0 or 1, and can be nothing beyond, it is Wilson's. Else it is Student's t, cut at the
-    bounds: what cannot be is taken out of an interval without a loss of coverage. None for values that are all alike,
-    which say nothing about how they spread.
+    Of values that are each 0 or 1, and can be nothing beyond, it is Wilson's; of values between two bounds it is
+    `bounded_interval`, which assumes no distribution. Else it is Student's t, cut at the bound: what cannot be is taken
+    out of an interval without a loss of coverage. None for values that are all alike, which say nothing about how they
+    spread.
     """
     n = len(values)
     if n and (low, high) == (0.0, 1.0) and set(values) <= {0.0, 1.0}:
         return wilson(sum(values), n, confidence)
+    if n and math.isfinite(low) and math.isfinite(high):
+        from golem.evaluation.metrics.anytime import bounded_interval
+
+        found = bounded_interval((np.array(values) - low) / (high - low), 1.0 - confidence)
+        return Interval(low + (high - low) * found.low, low + (high - low) * found.high)
     if len(set(values)) < 2:
         return None
     from scipy.stats import t as student

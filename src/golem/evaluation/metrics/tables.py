@@ -12,7 +12,7 @@ from golem.evaluation.metrics.summary import NO_MODULE, MethodSummary, PairedMea
 from golem.evaluation.metrics.text_table import TextTable, short_names
 
 SECONDS = Metric("", "s")
-OF_A_MEAN = "Student's t, cut at what the metric can be, and Wilson's where each trial is a yes or no"
+OF_A_MEAN = "of a share Wilson's or, where a trial is not a yes or no, by betting; else Student's t, cut at what can be"
 """How the interval of a mean was found."""
 INTERVAL = "95 % interval"
 BRIEF = (0, 1, 3, 4, 7, 8)

@@ -19,6 +19,10 @@ def render_page(template: str, facts: dict[str, str], **values: Any) -> str:
     Raises:
         MissingExtra: jinja2 is not installed.
     """
+    try:
+        import jinja2  # noqa: F401
+    except ImportError as error:
+        raise MissingExtra("jinja2", "report") from error
     return _pages().get_template(template).render(css=style(), facts=facts, **values)
 
 
@@ -30,10 +34,8 @@ def style() -> str:
 
 @cache
 def _pages() -> Any:
-    try:
-        from jinja2 import Environment, PackageLoader, StrictUndefined
-    except ImportError as error:
-        raise MissingExtra("jinja2", "report") from error
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
     loader = PackageLoader("golem.evaluation.report")
     return Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
 

@@ -136,7 +136,7 @@ def train(
         steps: gradient steps.
         batch: crops of a step.
         rate: peak learning rate.
-        check_every: steps between evaluations on part of the held-out split.
+        check_every: steps between evaluations on images that are set apart.
         start: ONNX file of an earlier detector to begin with.
         device: cpu, or cuda.
     """
@@ -241,9 +241,10 @@ def own(
         config = TrainDetectorConfig(
             labels, out, seed, steps, check_every=min(250, steps), start=start or default, classes=classes
         )
-        best = fit(config, data, held)
+        best = fit(config, data)
     path = export_onnx(best, out / "detector.onnx")
     detector = OnnxDetector(OnnxDetectorConfig(str(path), THRESHOLD, {}))
+    print("On the held-out images, which neither trained the network nor chose its checkpoint:")
     print(table(evaluate(held, detector.detect, classes=classes)))
     print(f"localizer: {{use: onnx, weights: {path}}}")
 

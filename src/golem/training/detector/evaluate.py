@@ -41,7 +41,7 @@ def draw_curve(curve: Path, out: Path) -> None:
             axes.plot(seen, [float(row[f"ap_{camera}_{label}"]) for row in rows], ".-", label=label)
         axes.set(ylim=(0.0, 1.0), xlabel="training crops [thousands]", title=camera)
         axes.grid(color="#dddddd")
-    panels[0].set(ylabel="AP on part of the held-out images")
+    panels[0].set(ylabel="AP on images that are set apart")
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside right upper", frameon=False)
     figure.savefig(out)
 
