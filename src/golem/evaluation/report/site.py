@@ -87,7 +87,7 @@ def _page(studies: Sequence[Study], link: Any, files: dict[str, str], root: str 
         {
             "title": s.title,
             "about": s.about,
-            "caption": s.caption(),
+            "caption": s.caption().replace("`", ""),
             "command": s.command,
             "rates": s.rates(),
             "comparisons": s.comparisons(),
@@ -204,7 +204,7 @@ def _data(studies: Sequence[Study], out: Path) -> dict[str, str]:
         files["trials.parquet"] = "data/trials.parquet"
     except ImportError:
         print("The site has no Parquet file: pyarrow is not installed; pip install pyarrow.")
-    tex = "\n\n".join(f"% {s.caption()}\n% {s.command}\n{s.rates().latex()}" for s in studies)
+    tex = "\n\n".join(f"% {s.title}. {s.caption()}\n% {s.command}\n{s.rates().latex()}" for s in studies)
     write_file(out / "data" / "tables.tex", tex + "\n")
     bib = resources.files("golem.evaluation.report").joinpath("golem.bib").read_text(encoding="utf-8")
     write_file(out / "data" / "golem.bib", bib.replace("COMMIT", studies[0].commit))

@@ -155,11 +155,11 @@ class Study:
         seeds, profiles = (
             ", ".join(dict.fromkeys(str(getattr(r, name)) for r in records)) for name in ("seed", "profile")
         )
-        return f"{self.title}. Profile {profiles}, n = {n} per method and cell, seed {seeds}, commit `{self.commit}`."
+        return f"Profile {profiles}, n = {n} per method and cell, seed {seeds}, commit `{self.commit}`."
 
     def markdown(self) -> str:
         """Return what a document shows: caption, table of rates, command."""
-        return f"*{self.caption()}*\n\n{self.rates().markdown()}\n\n```sh\n{self.command}\n```"
+        return f"*{self.title}. {self.caption()}*\n\n{self.rates().markdown()}\n\n```sh\n{self.command}\n```"
 
     def stages(self, cell: CellResult, method: str) -> dict[str, int]:
         """Return stage -> trials that were lost in it, most first."""
