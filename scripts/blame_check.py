@@ -96,7 +96,7 @@ class BlameCheck:
     """Of each, from 1 (small) to 5."""
     n: Annotated[int, arg(aliases=("-n",))] = 50
     """Trials of each."""
-    harm: int = 20
+    harm: int = 40
     """As of golem blame."""
     only: tuple[str, ...] = ()
     """Oracles to try; none tries all."""

@@ -78,7 +78,7 @@ def test_a_line_that_cannot_be_is_refused_in_one_sentence(tmp_path: Path, line: 
     [
         ("", "has no line of trials"),
         (HEAD, "has no line of trials"),
-        ("rung,method,stat,value\ntether,visual_servo,count,3\n", "lacks the column metric"),
+        ("rung,method,stat,value\ntether,visual_servo,count,3\n", "'metric' has no default"),
         (HEAD.strip() + ",luck\ntether,visual_servo,,success,count,30,3,,,,1\n", "Unknown column"),
     ],
 )

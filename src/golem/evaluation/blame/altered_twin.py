@@ -66,11 +66,7 @@ class AlteredTwin(MujocoRobot):
 
     @classmethod
     def newest(cls) -> AlteredTwin:
-        """Return the one that was built last in this process.
-
-        Raises:
-            ConfigError: there is none: what is fed with truth works in the judge's trials only.
-        """
+        """Return the one that was built last in this process, or raise a ConfigError."""
         twin = None if cls._newest is None else cls._newest()
         if twin is None:
             raise ConfigError("A module of truth needs the altered twin; name it by --use oracle=... on a rung.")

@@ -45,7 +45,7 @@ class BlameConfig:
     """Oracles to try, e.g. detections arms."""
     n: Annotated[int, arg(aliases=("-n",))] = 50
     """Lost trials of each method that are run again, the first ones."""
-    harm: int = 20
+    harm: int = 40
     """Won trials of each method that are run again, to see what an exchange loses."""
     j: Annotated[int, arg(aliases=("-j",))] = 1
     """Processes that run trials at the same time."""
@@ -100,21 +100,16 @@ class Verdict:
         pairs = {**self.pairs, "all of a share above": self.total} if self.shares else {}
         rows += [(name, "", "", "", *_cells(one), "", "", "") for name, one in pairs.items()]
         how = "orders drawn" if len(self.shares) > EXACT else "all coalitions run"
+        best = f"No module is proved to lose trials; first by share: {self.first or 'none'}."
+        for name in self.proved[:1]:
+            best = f"A better {name} buys the most: {self.singles[name][2].interval.text(100)} points."
+        left = len(s.lost_run) - self.all_wins
         return TextTable(
             f"{self.rung}, {self.method}: {s.won} of {s.n} won, {rate.text(100)} %",
             ("exchanged", "for", "lost won", "won lost", "points", "95 %", "proved", f"share ({how})", "95 %"),
             tuple(rows),
-            self._words(),
+            f"{best} With everything exchanged {left} of {len(s.lost_run)} lost trials are lost all the same.",
         )
-
-    def _words(self) -> str:
-        """Return what buys the most, and what nothing here buys."""
-        left = len(self.strata.lost_run) - self.all_wins
-        rest = f"With everything exchanged {left} of {len(self.strata.lost_run)} lost trials are lost all the same."
-        if not self.proved:
-            return f"No module is proved to lose trials (95 % for all {len(self.singles)} together). {rest}"
-        span = self.singles[self.proved[0]][2].interval.text(100)
-        return f"A better {self.proved[0]} buys the most: {span} points. {rest}"
 
 
 def _cells(one: Points | None) -> tuple[str, str]:
@@ -282,8 +277,5 @@ def budget(verdicts: Sequence[Verdict]) -> TextTable:
             rate = f"{100 * s.won / s.n:.1f} {wilson(s.won / s.alike, s.n / s.alike).text(100)}"
             rows.append((method, one.rung, rate, *cells, f"{100 * rest:.1f}"))
             before = now
-    note = (
-        "Success and points [%]: Shapley's shares of what is lost, in brackets what a rung adds to the one above it in "
-        "the table; the rest is lost by what has no oracle, and by chance."
-    )
+    note = "Shapley's shares of what is lost [%], in brackets what a rung adds; rest: what has no oracle, and chance."
     return TextTable("Error budget", ("method", "rung", "success", *names, "rest"), tuple(rows), note)

@@ -7,9 +7,9 @@ difference from it; Angelopoulos, Duchi and Zrnic (PPI++, arXiv 2311.01453, 2023
     lambda = cov(Y, f) / ((1 + n / N) var(f))
 
 so that the variance, var(Y - lambda f) / n + lambda^2 var(f) / N, is least; a useless simulation gets lambda 0.
-Their interval is normal, which is too short for shares of few trials. Here it is Wilson's of `theta` for as many trials
-as the variance is worth, n var(Y) / var, which is Wilson's of the real trials alone where lambda is 0 (own choice;
-`scripts/ppi_check.py` measures its coverage). It is that of the real trials, too, where it would be wider.
+Their normal interval is too short for shares of few trials. Here it is Wilson's of `theta` for as many trials as the
+variance is worth, n var(Y) / var, or that of the real trials alone where that is shorter (own choice; its coverage:
+`scripts/ppi_check.py`).
 """
 
 from __future__ import annotations

@@ -25,8 +25,8 @@ from golem.finite import check_finite
 from golem.options import fill, read_yaml
 from golem.output_file import write_file
 
-COLUMNS = ("rung", "method", "case", "metric", "stat", "n", "value", "sd", "index", "source")
-NEEDED = ("rung", "method", "metric", "stat", "value")
+SHIPPED = files("golem.evaluation.real")
+NUMBERS = ("n", "value", "sd", "index")
 SUCCESS, NO_TWIN = "success", "no trials of the twin"
 DRAWS = 4000
 """Samples of a bootstrap."""
@@ -95,15 +95,12 @@ def read_real(path: str) -> list[RealRow]:
         ConfigError: it cannot be read, lacks a column, or a line says what cannot be; names the line.
     """
     try:
-        text = _shipped(path) if path == "paper" else Path(path).read_text(encoding="utf-8-sig")
+        text = (SHIPPED / "paper.csv" if path == "paper" else Path(path)).read_text(encoding="utf-8-sig")
         lines = list(csv.DictReader(io.StringIO(text, newline=""), restkey="", restval="", strict=True))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise ConfigError(f"{path} cannot be read as CSV: {error}.") from error
     if not lines:
         raise ConfigError(f"{path} has no line of trials; golem real --template FILE writes one to begin with.")
-    for name in NEEDED:
-        if name not in lines[0]:
-            raise ConfigError(f"{path} lacks the column {name}; columns: {', '.join(COLUMNS)}.")
     return [_row(f"line {k} of {path}", line) for k, line in enumerate(lines, start=2)]
 
 
@@ -111,8 +108,7 @@ def _row(where: str, line: dict[str, str]) -> RealRow:
     if "" in line:
         raise ConfigError(f"In {where} are more cells than columns.")
     cells = {name: text.strip() for name, text in line.items() if text.strip()}
-    numbers = ("n", "value", "sd", "index")
-    values = {name: read_yaml(text, where) if name in numbers else text for name, text in cells.items()}
+    values = {name: read_yaml(text, where) if name in NUMBERS else text for name, text in cells.items()}
     values = {"n": 1, **values} if cells.get("stat") == "trial" else values
     row: RealRow = fill(f"column in {where}", RealRow, values)
     check_finite(f"The value in {where}", np.array([row.value, row.sd or 0.0]))
@@ -126,10 +122,6 @@ def _row(where: str, line: dict[str, str]) -> RealRow:
     return row
 
 
-def _shipped(name: str) -> str:
-    return (files(__package__ or "") / f"{name}.csv").read_text(encoding="utf-8")
-
-
 def run_real(config: RealConfig) -> int:
     """Print the table; returns how many rows there are.
 
@@ -138,7 +130,7 @@ def run_real(config: RealConfig) -> int:
         golem.errors.OutputError: records cannot be read, or the template not be written.
     """
     if config.template is not None:
-        print(f"Wrote {write_file(config.template, _shipped('template'))}.")
+        print(f"Wrote {write_file(config.template, (SHIPPED / 'template.csv').read_text('utf-8'))}.")
         return 1
     rows, twins = read_real(config.file), list[TrialRecord]()
     for run in config.runs:
