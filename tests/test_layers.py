@@ -34,8 +34,9 @@ LAYERS = (
     ("capabilities",),
     ("skills",),
     ("stack", "runtime", "provenance"),
+    ("agent",),
     ("evaluation", "training", "dashboard", "doctor", "option_list"),
-    ("run", "demo", "demo_walk", "cli", "__main__"),
+    ("run", "demo", "demo_walk", "agent_command", "cli", "__main__"),
 )
 LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}
 NOT_AT_RUN_TIME = "training"

@@ -289,6 +289,8 @@ COMMANDS: dict[str, Callable[[list[str]], int]] = {
     "restart": _command("Restart one process of a launched robot: twin, safety or up.",
                         "golem.runtime.live.operator", "RestartConfig:run_restart"),
     "skill": _skill,
+    "mcp": _command("Offer the skills as tools for programs and language models, by the Model Context Protocol.",
+                    "golem.agent_command", "McpConfig:run_mcp", True),
     "topics": _command("List what is on a domain, with rates and bytes.",
                        "golem.runtime.live.topic_stats", "TopicStatsConfig:run_topic_stats"),
     "record": _command("Record a domain into a bag that ROS 2 tools and Foxglove read.",

@@ -60,6 +60,7 @@ class LiveView:
 
     Attributes:
         period: as of a node that looks on, see `golem.runtime.executor.Node`.
+        decide: called when the operator has allowed or denied what the panel asks.
     """
 
     period = TICK
@@ -103,6 +104,7 @@ class LiveView:
         self._paused = self._busy = self._restart = False
         self._wanted: tuple[str, Any] | None = None
         self._note = ""
+        self.decide: Callable[[bool], None] = lambda yes: None
         self._next_camera = 0.0
         self._factor = 1.0
         self._watch(running, robot)
@@ -290,6 +292,8 @@ class LiveView:
                 self._ask()
             elif button is Button.CANCEL:
                 self._running.cancel()
+            elif button in (Button.ALLOW, Button.DENY):
+                self.decide(button is Button.ALLOW)
             elif button is Button.RESTART:
                 self._restart = not self._busy
             elif button is Button.STAND and self._panel.legs is not None:

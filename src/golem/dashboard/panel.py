@@ -145,6 +145,8 @@ class Button(StrEnum):
     RESTART = "start over"
     STAND = "stop walking"
     PUSH = "push the robot"
+    ALLOW = "allow what is asked"
+    DENY = "deny what is asked"
 
 
 class Panel:
@@ -185,6 +187,8 @@ class Panel:
             self._revive = gui.add_button("Reset and activate", visible=False)
             self._pause = gui.add_button("Pause", color="gray")
             self._restart = gui.add_button("Start over", color="gray", visible=restarts)
+            self._question = gui.add_html("", visible=False)
+            self._answers = gui.add_button("Allow", color="green", visible=False), gui.add_button("Deny", visible=False)
         self.skill = SkillPanel(gui, skills, first)
         self.legs = LegsPanel(gui) if standing else None
         buttons = [
@@ -195,6 +199,7 @@ class Panel:
             (self.skill.cancel, Button.CANCEL),
             (self._pause, Button.PAUSE),
             (self._restart, Button.RESTART),
+            *zip(self._answers, (Button.ALLOW, Button.DENY), strict=True),
         ]
         if self.legs is not None:
             buttons += [(self.legs.stop_button, Button.STAND), (self.legs.push_button, Button.PUSH)]
@@ -207,6 +212,12 @@ class Panel:
     def press(self, button: Button) -> None:
         """Press a button as a click does, from any thread."""
         self._asked.put(button)
+
+    def ask(self, text: str | None) -> None:
+        """Show a question, to be allowed or denied, from any thread; None takes it away."""
+        self._question.content = "" if text is None else f'<div style="padding:4px 14px"><b>{escape(text)}</b></div>'
+        for handle in (self._question, *self._answers):
+            handle.visible = text is not None
 
     def pressed(self) -> list[Button]:
         """Return what was pressed since the last call, in order."""

@@ -21,6 +21,7 @@ from golem.middleware.bus import Bus
 from golem.robots.base import HasGantry, HasLivingSensors, Robot
 from golem.robots.sensors.profiles import load_profile
 from golem.runtime.chain import chain_of
+from golem.runtime.checked import CheckedMemory
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.executor import FOREVER, Executor, in_order, when_stepped
 from golem.runtime.node_groups import RobotNodes, SafetyNodes, StackNodes, hears_lidar
@@ -87,6 +88,11 @@ class LockstepRunner:
     def skills(self) -> SkillTable:
         """The skills of the stack."""
         return self._stack.skills
+
+    @property
+    def memory(self) -> CheckedMemory:
+        """What the stack remembers."""
+        return self._stack.memory
 
     @property
     def safety(self) -> GateStatus | None:

@@ -10,7 +10,7 @@ from golem.errors import ModuleFault, unknown_name
 from golem.runtime.contract_check import ContractCheck
 from golem.skills.base import Routine, Skill
 from golem.skills.context import Context
-from golem.skills.spec import SkillSpec, read_goal, schema_of, summary
+from golem.skills.spec import SkillSpec, read_goal, schema_of, summary, with_ranges
 from golem.stack import Choice, Stack
 
 
@@ -69,6 +69,8 @@ class SkillTable:
 def _spec(name: str, choice: Choice) -> SkillSpec:
     cls = registry.load(registry.SKILL, choice.use)
     try:
-        return SkillSpec(name, choice.use, summary(cls), schema_of(getattr(cls, "Goal", None)))
+        kind: Any = getattr(cls, "Goal", None)
+        result = schema_of(cls.Result) if hasattr(cls, "Result") else {}
+        return SkillSpec(name, choice.use, summary(cls), with_ranges(kind, schema_of(kind)), result)
     except Exception as error:  # a user's dataclass may refer to what does not exist
-        raise ModuleFault(registry.SKILL, choice.use, f"its 'Goal' is unsuitable: {error}") from error
+        raise ModuleFault(registry.SKILL, choice.use, f"its 'Goal' or 'Result' is unsuitable: {error}") from error

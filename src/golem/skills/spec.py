@@ -11,12 +11,12 @@ import math
 import re
 import types
 import typing
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from golem.errors import ConfigError, GolemError, ModuleFault, shorten
+from golem.errors import ConfigError, GolemError, ModuleFault, shorten, unknown_name
 from golem.options import fill
 
 K = TypeVar("K")
@@ -39,13 +39,15 @@ class SkillSpec:
         name: by which the stack calls it.
         use: its implementation, as the stack file names it.
         summary: what it does, in a line.
-        goal: schema of its goals.
+        goal: schema of its goals, with the ranges that they accept.
+        result: schema of what it finds out; empty where it does not say.
     """
 
     name: str
     use: str
     summary: str
     goal: Schema
+    result: Schema = field(default_factory=Schema)
 
 
 def schema_of(kind: Any) -> Schema:
@@ -59,16 +61,16 @@ def schema_of(kind: Any) -> Schema:
     hints, notes = typing.get_type_hints(kind), _notes(kind)
     properties: dict[str, Schema] = {}
     required: list[str] = []
-    for field in dataclasses.fields(kind):
-        properties[field.name] = of = _of_hint(f"{kind.__name__}.{field.name}", hints[field.name])
-        if field.name in notes:
-            of["description"] = notes[field.name]
-        if field.default is not dataclasses.MISSING:
-            of["default"] = plain(field.default)
-        elif field.default_factory is not dataclasses.MISSING:
-            of["default"] = plain(field.default_factory())
+    for row in dataclasses.fields(kind):
+        properties[row.name] = of = _of_hint(f"{kind.__name__}.{row.name}", hints[row.name])
+        if row.name in notes:
+            of["description"] = notes[row.name]
+        if row.default is not dataclasses.MISSING:
+            of["default"] = plain(row.default)
+        elif row.default_factory is not dataclasses.MISSING:
+            of["default"] = plain(row.default_factory())
         else:
-            required.append(field.name)
+            required.append(row.name)
     return {
         "type": "object",
         "description": summary(kind),
@@ -96,10 +98,63 @@ def _of_hint(where: str, hint: Any) -> Schema:
     raise TypeError(f"{where} is of type {hint}, which cannot be written as JSON")
 
 
+BEYOND = 1e9
+"""A number that no goal means; one that is accepted has no bound [own]."""
+
+
+def with_ranges(kind: type[Any], schema: Schema) -> Schema:
+    """Return `schema`, of the goals of `kind`, with the range that each number has while the others are as by default.
+
+    They are asked of the class itself: bisected between a number that it accepts and one that it refuses.
+    """
+    sample = {name: _sample(of) for name, of in schema["properties"].items() if "default" not in of}
+    properties = dict(schema["properties"])
+    for name, of in properties.items():
+        number = of.get("type") in ("integer", "number")
+        start = of.get("default", sample.get(name))
+
+        def accepts(value: float, name: str = name) -> bool:
+            try:
+                kind(**{**sample, name: value})
+            except Exception:  # a user's class may raise anything
+                return False
+            return True
+
+        if number and accepts(start):
+            whole, found = of["type"] == "integer", dict(of)
+            for word, sign in (("Minimum", -1), ("Maximum", 1)):
+                end = _bound(accepts, start, sign * (int(BEYOND) if whole else BEYOND), whole)
+                if end is not None:
+                    found[word.lower() if accepts(end) else f"exclusive{word}"] = end
+            properties[name] = found
+    return schema | {"properties": properties}
+
+
+def _bound(accepts: Callable[[float], bool], good: float, bad: float, whole: bool) -> float | None:
+    """Return the last number from `good` on towards `bad` that is accepted; None where `bad` is."""
+    if accepts(bad):
+        return None
+    for _ in range(80):
+        middle = (good + bad) // 2 if whole else 0.5 * (good + bad)
+        if middle in (good, bad):
+            break
+        good, bad = (middle, bad) if accepts(middle) else (good, middle)
+    return good if whole else round(good, 9)
+
+
+def _sample(of: Schema) -> Any:
+    """Return a value of what has no default, for `with_ranges`."""
+    if "enum" in of:
+        return of["enum"][0]
+    if "prefixItems" in of:
+        return tuple(_sample(each) for each in of["prefixItems"])
+    return {"boolean": False, "integer": 1, "number": 0.0, "string": "a", "array": ("a",)}.get(str(of.get("type")))
+
+
 def plain(value: Any) -> Any:
     """Return `value`, a dataclass or what one is made of, as JSON has it."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return {field.name: plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
+        return {row.name: plain(getattr(value, row.name)) for row in dataclasses.fields(value)}
     if isinstance(value, list | tuple):
         return [plain(each) for each in cast("list[Any]", value)]
     return str(value) if isinstance(value, Path) else value
@@ -120,6 +175,63 @@ def read_goal(name: str, kind: type[K], fields: Mapping[str, object]) -> K:
         raise
     except Exception as error:  # a user's class may raise anything
         raise ModuleFault("skill", name, f"its goal raised {type(error).__name__}: {error}") from error
+
+
+def read_fields(spec: SkillSpec, fields: Mapping[str, object]) -> dict[str, Any]:
+    """Return all fields of a goal of a skill that are said by whomever, with its defaults.
+
+    Raises:
+        ConfigError: one does not exist, is missing, has the wrong type, or is out of its range or far too much.
+    """
+    for key, value in fields.items():
+        _check(f"goal field of {spec.name} '{shorten(str(key))}'", value)
+    return _fitted(f"goal of {spec.name}", spec.goal, fields)
+
+
+def _fitted(where: str, of: Schema, value: Any) -> Any:
+    """Return `value` with the defaults of what the schema `of` describes."""
+    if "anyOf" in of:
+        return None if value is None else _fitted(where, of["anyOf"][0], value)
+    if "enum" in of:
+        if not any(value == each and type(value) is type(each) for each in of["enum"]):
+            raise unknown_name(f"value of the {where}", shorten(str(value)), map(str, of["enum"]))
+        return value
+    kinds, wanted = _JSON[of["type"]]
+    if not isinstance(value, kinds) or (isinstance(value, bool) and of["type"] != "boolean"):
+        raise ConfigError(f"The {where} is {wanted}, not {shorten(repr(value))}.")
+    low, high = of.get("minimum", of.get("exclusiveMinimum")), of.get("maximum", of.get("exclusiveMaximum"))
+    outside = (low is not None and (value < low or value == of.get("exclusiveMinimum"))) or (
+        high is not None and (value > high or value == of.get("exclusiveMaximum"))
+    )
+    if outside:
+        ends = (f"at least {low:g}" if low is not None else "", f"at most {high:g}" if high is not None else "")
+        raise ConfigError(f"The {where} is {' and '.join(filter(None, ends))}, not {value:g}.")
+    if of["type"] == "array":
+        inner = of.get("prefixItems") or [of["items"]] * len(value)
+        if len(inner) != len(value):
+            raise ConfigError(f"The {where} has {len(inner)} values, not {len(value)}.")
+        return [_fitted(where, kind, each) for kind, each in zip(inner, value, strict=True)]
+    if of["type"] != "object":
+        return value
+    properties = of["properties"]
+    for key in value:
+        if key not in properties:
+            raise unknown_name(f"field of the {where}", shorten(str(key)), properties)
+    missing = [key for key in of["required"] if key not in value]
+    if missing:
+        raise ConfigError(f"The {where} needs {', '.join(missing)}.")
+    whole = {key: value.get(key, each.get("default")) for key, each in properties.items()}
+    return {key: _fitted(f"{where}, '{key}'", properties[key], each) for key, each in whole.items()}
+
+
+_JSON: dict[str, tuple[tuple[type, ...], str]] = {
+    "boolean": ((bool,), "true or false"),
+    "integer": ((int,), "an integer"),
+    "number": ((int, float), "a number"),
+    "string": ((str,), "a word"),
+    "array": ((list, tuple), "a list"),
+    "object": ((Mapping,), "an object"),
+}
 
 
 def as_goal(name: str, kind: type[K], goal: object) -> K:

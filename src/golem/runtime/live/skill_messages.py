@@ -129,7 +129,10 @@ def _text(text: str) -> str:
 def list_message(specs: Iterable[SkillSpec]) -> golem_interfaces.SkillList:
     """Return the skills that a stack offers."""
     return golem_interfaces.SkillList(
-        [golem_interfaces.SkillDescription(s.name, s.use, s.summary, json.dumps(s.goal)) for s in specs]
+        [
+            golem_interfaces.SkillDescription(s.name, s.use, s.summary, json.dumps(s.goal), json.dumps(s.result))
+            for s in specs
+        ]
     )
 
 
@@ -140,7 +143,7 @@ def read_list(message: golem_interfaces.SkillList) -> dict[str, SkillSpec]:
         GolemError: a goal is described by what is no JSON.
     """
     try:
-        specs = [SkillSpec(s.name, s.use, s.summary, json.loads(s.goal)) for s in message.skills]
+        specs = [SkillSpec(s.name, s.use, s.summary, json.loads(s.goal), json.loads(s.result)) for s in message.skills]
     except ValueError as error:
         raise GolemError(f"The list of skills cannot be read: {error}.") from error
     return {spec.name: spec for spec in specs}

@@ -338,6 +338,7 @@ class SkillDescription(Message):
         use: its implementation, as the stack file names it
         summary: what it does, in a line
         goal: JSON Schema of its goals
+        result: JSON Schema of what it finds out; {} where it does not say
     """
 
     __msgtype__: ClassVar[str]
@@ -345,6 +346,7 @@ class SkillDescription(Message):
     use: str = ...
     summary: str = ...
     goal: str = ...
+    result: str = ...
 
 @dataclass(slots=True, eq=False)
 class SkillFeedback(Message):
