@@ -139,7 +139,20 @@ def http_app(desk: Desk, token: str) -> Callable[..., Awaitable[None]]:
             await send(start)
             await send({"type": "http.response.body", "body": b"The token that GOLEM has printed is needed.\n"})
             return
-        await app(scope, receive, send)
+        session, whole = headers.get(b"mcp-session-id", b"").decode("latin-1"), False
+
+        async def heard() -> Any:
+            message = await receive()
+            if message["type"] == "http.disconnect" and session and scope.get("method") == "POST" and not whole:
+                desk.leave(session)  # up to the protocol of 2025-11 the call itself would go on without its client
+            return message
+
+        async def said(message: Any) -> None:
+            nonlocal whole
+            whole = message["type"] == "http.response.body" and not message.get("more_body", False)
+            await send(message)
+
+        await app(scope, heard, said)
 
     return guarded
 
