@@ -37,6 +37,8 @@ CLEAN_UP = 12.0
 """Time that a skill gets to leave the robot safe when the desk closes [s]: a little more than it has itself."""
 OWN = ("stop", "look", "read")
 """Tools that are no skills."""
+STILL = (*OWN, "recall", "remember")
+"""Tools that move nothing; they need no lease."""
 
 
 @dataclass(frozen=True)
@@ -158,16 +160,14 @@ class Desk:
             self._recent.popleft()
         known = call.tool if call.tool in self.tools else shorten(repr(call.tool))
         self._tell("call", call, tool=known, arguments=_sized(call.arguments))
-        if call.tool == "stop":
-            self._stop(call)
-            return
-        self._recent.append(now)
-        if len(self._recent) > self.rules.calls:
-            self._recent.pop()
-            self._refuse(call, f"More than {self.rules.calls} calls a second.")
-            return
         try:
-            self._admit(call)
+            if call.tool == "stop":
+                self._stop(call)
+            elif len(self._recent) >= self.rules.calls:
+                self._refuse(call, f"More than {self.rules.calls} calls a second.")
+            else:
+                self._recent.append(now)
+                self._admit(call)
         except GolemError as error:
             self._refuse(call, str(error))
         except Exception as error:  # arguments are a stranger's
@@ -204,7 +204,8 @@ class Desk:
             problem = f"The rules allow this tool {rule.count} times."
         if problem:
             raise GolemError(problem)
-        self._lease(call.session)
+        if call.tool not in STILL:
+            self._lease(call.session)
         if rule.run == "free" or labels:
             self._begin(call)
             return

@@ -26,7 +26,7 @@ from golem.middleware.ros.msgs.golem_interfaces import RunSkill_Goal
 from golem.middleware.ros.msgs.std_srvs import Trigger_Request
 from golem.middleware.ros.node import RosNode
 from golem.middleware.ros.pubsub import Subscription
-from golem.runtime.live.node_setup import ANSWER, SEARCH, until
+from golem.runtime.live.node_setup import SEARCH, until
 from golem.runtime.live.skill_client import ask_skills
 from golem.runtime.live.skill_messages import RUN
 from golem.skills.base import SkillResult
@@ -122,9 +122,9 @@ class DomainBody:
 
     def stop_motors(self) -> None:
         """Stop; see `Body`."""
-        if not until(self._node, self._stopper.ready, SEARCH):
+        if not self._stopper.ready():
             raise RosError("Nobody offers '/safety/stop'.")
-        self._node.wait(self._stopper.call(Trigger_Request()), ANSWER)
+        self._stopper.call(Trigger_Request())
 
     def moment(self) -> Moment | None:
         """Return how the robot moves; see `Body`."""

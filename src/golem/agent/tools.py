@@ -7,12 +7,10 @@ from typing import Any
 
 from golem.agent.answers import WORDS, answer_schema
 from golem.agent.body import CAMERAS, RESOURCES
-from golem.agent.desk import Desk
+from golem.agent.desk import STILL, Desk
 from golem.agent.rules import ToolRule
 from golem.skills.spec import Schema, SkillSpec
 
-STILL = ("recall", "remember", "stop", "look", "read")
-"""Tools that move nothing."""
 _ASKS = {"free": "", "ask": " The operator is asked first.", "never": " The rules do not allow it."}
 _FOUND: Schema = {
     "type": "object",

@@ -1,0 +1,77 @@
+"""The desk beside twin, gate and stack on a domain, as a client of their topics and actions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from tests.runtime.live.conftest import Live, live  # noqa: F401 - a fixture
+
+from golem.agent.audit import AuditLog
+from golem.agent.desk import Answer, Call, Desk
+from golem.agent.domain_body import DomainBody
+from golem.agent.rules import Rules
+from golem.types import TICK
+
+
+@pytest.fixture
+def desk(live: Live, tmp_path: Path) -> Desk:  # noqa: F811
+    live.activate()
+    live.run(0.1)
+    body = DomainBody(live.member("mcp")[1], "start one")
+    spin = body.step
+
+    def step() -> None:
+        live.run(5 * TICK)
+        spin()
+
+    body.step = step
+    return Desk(body, Rules(default="free", calls=1000), AuditLog(tmp_path / "audit.jsonl"))
+
+
+def finish(desk: Desk, call: Call, until: Callable[[], bool] = lambda: False) -> Answer | None:
+    desk.submit(call)
+    for _ in range(2000):
+        desk.turn()
+        if call.answered.done() or until():
+            break
+    return call.answered.result(0) if call.answered.done() else None
+
+
+def test_skills_of_the_domain_are_tools(desk: Desk) -> None:
+    assert desk.body.specs["open"].result["properties"] and "walk" in desk.body.specs
+    said: list[str] = []
+    done = finish(desk, Call("a", "stand", {"seconds": 0.3}, lambda f: said.append(f.text)))
+    assert done is not None and done.data["success"], done
+    assert done.data["timings"] == {"stand": pytest.approx(0.3, abs=0.02)} and said
+    recalled = desk.call("recall", {"text": "mug"})
+    assert recalled["success"], recalled
+    assert recalled["value"]["places"] == []
+    assert desk.call("read", {"resource": "safety"})["safety"]["state"] == "active"
+    state = desk.call("read", {"resource": "state"})["state"]
+    assert len(state["joints"]) == 27 and state["base"]["frame"] == "odom"
+
+
+def test_what_the_stack_refuses_is_said(desk: Desk) -> None:
+    data = desk.call("walk", {"x": 1.0})
+    assert not data["success"] and data["stage"] == "refused" and "do not walk" in data["reason"]["text"]
+
+
+def test_a_cancellation_reaches_the_robot(desk: Desk) -> None:
+    call = Call("a", "stand", {"seconds": 100.0})
+    heard: list[str] = []
+    call.tell = lambda feedback: heard.append(feedback.text)
+    assert finish(desk, call, lambda: bool(heard)) is None
+    desk.cancel(call)
+    for _ in range(100):
+        desk.turn()
+        if call.answered.done():
+            break
+    assert call.answered.result(0).data["stage"] == "cancelled" and not desk.body.busy
+
+
+def test_a_stop_of_the_motors_is_the_gates(desk: Desk, live: Live) -> None:  # noqa: F811
+    assert desk.call("stop", {"motors": True})["success"]
+    live.run(0.2)
+    assert live.state is not None and live.state.value.startswith("stop")

@@ -1,0 +1,84 @@
+"""Files: the rules that are read, and the log that is written."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from golem.agent.audit import AuditLog, read_audit
+from golem.agent.rules import Region, Rules, ToolRule, load_rules
+from golem.errors import ConfigError, GolemError
+
+
+def read(folder: Path, text: str) -> Rules:
+    file = folder / "rules.yaml"
+    file.write_text(text)
+    return load_rules(file)
+
+
+def test_rules_are_read(tmp_path: Path) -> None:
+    text = """
+default: never
+region: {x: [-1, 2], y: [-0.5, 0.5]}
+speed: 0.4
+tools:
+  walk: {run: ask, count: 3, fields: {timeout: [0, 30], frame: [odom]}}
+"""
+    rules = read(tmp_path, text)
+    assert rules.of("pick").run == "never" and rules.of("recall").run == "free"
+    assert rules.of("walk") == ToolRule("ask", 3, {"timeout": [0, 30], "frame": ["odom"]})
+    assert rules.region == Region((-1.0, 2.0), (-0.5, 0.5)) and rules.speed == 0.4
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "default: always",
+        "- a",
+        "tools: [walk]",
+        "tools: {walk: free}",
+        "tools: {walk: {run: free, speed: 1}}",
+        "tools: {walk: {fields: {x: [1]}}}",
+        "tools: {walk: {fields: {x: {a: 1}}}}",
+        "tools: {walk: {count: -1}}",
+        "region: {x: [1, 0], y: [0, 1]}",
+        "region: {x: [0, 1]}",
+        "speed: -1",
+        "speed: .nan",
+        "calls: 0",
+        "x: &a [*a]",
+        "default: ask\ndefault: free",
+    ],
+)
+def test_rules_without_sense_are_refused_in_one_sentence(tmp_path: Path, text: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        read(tmp_path, text)
+    assert "\n" not in str(caught.value)
+
+
+def test_no_rules_at_all_ask_for_everything_that_moves() -> None:
+    assert load_rules(None).of("walk").run == "ask"
+    with pytest.raises(ConfigError):
+        load_rules(Path("/nowhere/rules.yaml"))
+
+
+def test_the_log_goes_on_and_shows_what_was_changed(tmp_path: Path) -> None:
+    file = tmp_path / "a" / "audit.jsonl"
+    for run in range(2):
+        log = AuditLog(file, bag=f"bag_{run}")
+        log.write("call", 1.5, arguments={"text": "\ud800", "long": "x" * 10_000})
+        log.close()
+    entries = list(read_audit(file))
+    assert [e["event"] for e in entries] == ["begin", "call"] * 2 and entries[2]["bag"] == "bag_1"
+    assert entries[1]["arguments"]["characters"] > 10_000 and "x" * 100 not in file.read_text()
+    lines = file.read_text().splitlines()
+    for wrong in (lines[:1] + lines[2:], [lines[0], lines[1].replace("1.5", "1.6"), *lines[2:]], ["{}"], ["[]"], ["x"]):
+        file.write_text("\n".join(wrong) + "\n")
+        with pytest.raises(GolemError, match="Line"):
+            list(read_audit(file))
+        with pytest.raises(GolemError):
+            AuditLog(file)
+    file.write_text("\n".join(lines) + "\n")
+    assert json.loads(file.read_text().splitlines()[0])["before"] == ""
