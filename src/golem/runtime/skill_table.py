@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Any
 
 from golem import registry
@@ -10,7 +11,7 @@ from golem.errors import ModuleFault, unknown_name
 from golem.runtime.contract_check import ContractCheck
 from golem.skills.base import Routine, Skill
 from golem.skills.context import Context
-from golem.skills.spec import SkillSpec, read_goal, schema_of, summary, with_ranges
+from golem.skills.spec import Schema, SkillSpec, read_goal, schema_of, summary, with_ranges
 from golem.stack import Choice, Stack
 
 
@@ -70,7 +71,9 @@ def _spec(name: str, choice: Choice) -> SkillSpec:
     cls = registry.load(registry.SKILL, choice.use)
     try:
         kind: Any = getattr(cls, "Goal", None)
-        result = schema_of(cls.Result) if hasattr(cls, "Result") else {}
-        return SkillSpec(name, choice.use, summary(cls), with_ranges(kind, schema_of(kind)), result)
+        goal, result = with_ranges(kind, schema_of(kind)), Schema()
+        with suppress(Exception):  # what a skill finds out is described where it can be
+            result = schema_of(getattr(cls, "Result", None))
+        return SkillSpec(name, choice.use, summary(cls), goal, result)
     except Exception as error:  # a user's dataclass may refer to what does not exist
-        raise ModuleFault(registry.SKILL, choice.use, f"its 'Goal' or 'Result' is unsuitable: {error}") from error
+        raise ModuleFault(registry.SKILL, choice.use, f"its 'Goal' is unsuitable: {error}") from error
