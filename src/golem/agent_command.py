@@ -6,7 +6,7 @@ import asyncio
 import secrets
 import sys
 import threading
-from contextlib import ExitStack, closing, redirect_stdout
+from contextlib import ExitStack, closing, redirect_stdout, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
@@ -19,6 +19,7 @@ from golem.agent.console import HELP, Operator, terminal
 from golem.agent.desk import Desk
 from golem.agent.domain_body import DomainBody
 from golem.agent.mcp_server import modules, serve_http, serve_stdio
+from golem.agent.planner import Planner, replay
 from golem.agent.rules import load_rules
 from golem.agent.stack_body import StackBody
 from golem.dashboard.live import LiveView
@@ -34,11 +35,16 @@ from golem.stack import load_stack
 class McpConfig:
     """Offer the skills of a robot as tools of the Model Context Protocol, on stdin and stdout or on a port.
 
-    With a STACK the robot is simulated in this process; without, it is the one on the domain.
+    With a STACK the robot is simulated in this process; without, it is the one on the domain. With --do or --replay
+    nobody is served: the same tools, under the same rules, are used at once.
     """
 
     stack: Annotated[str | None, Positional, arg(metavar="[STACK]")] = None
     """Path of a stack file, or the name of a shipped one."""
+    do: Annotated[str | None, arg(metavar="WORDS")] = None
+    """Do this errand without any model, e.g. 'put the mug where the bowl was'."""
+    replay: Annotated[Path | None, arg(metavar="FILE")] = None
+    """Make the calls of an audit log again."""
     rules: Path | None = None
     """YAML file that says which tools run freely, ask or never run; by default all that move ask."""
     audit: Path = Path("audit.jsonl")
@@ -63,43 +69,57 @@ class McpConfig:
 
 
 def run_mcp(config: McpConfig) -> bool:
-    """Serve until the client leaves, or Ctrl-C.
+    """Serve until the client leaves, or Ctrl-C; or do what is asked, and return whether it was done.
 
     Raises:
         ConfigError, GolemError: an option, the stack or the rules are wrong, or no robot is there.
         MissingExtra: mcp is not installed.
     """
-    modules()
+    served = config.do is None and config.replay is None
+    if served:
+        modules()
     rules, token = load_rules(config.rules), _token(config)
     if config.stack is None and (config.view or config.record is not None):
         raise ConfigError("--view and --record are for a STACK in this process; beside a domain: golem view, record.")
-    with ExitStack() as closing_all:
+    with ExitStack() as ending:
         log = AuditLog(config.audit, bag=str(config.record or ""), stack=config.stack or "", rules=str(config.rules))
-        closing_all.callback(log.close)
+        ending.callback(log.close)
         view: LiveView | None = None
         body: Body
         if config.stack is None:
-            _, node = closing_all.enter_context(member("mcp", config.dds))
-            body = DomainBody(node, f"start a stack with: {config.dds.command('up STACK')}", config.jobs)
+            joined = ending.enter_context(member("mcp", config.dds))
+            body = DomainBody(*joined, f"start a stack with: {config.dds.command('up STACK')}", config.jobs)
         else:
             # Where stdout is the client's, what a library prints goes elsewhere.
             with redirect_stdout(sys.stderr):
                 running, robot = build(load_stack(config.stack, profile=config.profile), config.seed)
-                closing_all.enter_context(closing(robot))
-                show = closing_all.enter_context(on_air(running, robot, config.record))
+                ending.enter_context(closing(robot))
+                show = ending.enter_context(on_air(running, robot, config.record))
                 if config.view:
-                    view = closing_all.enter_context(LiveView(running, shown(running, robot), passive=True))
-            watched = show if config.record is not None else None
-            body = StackBody(running, robot, config.paced or config.view, watched)
+                    view = ending.enter_context(LiveView(running, shown(running, robot), passive=True))
+            paced = config.paced or config.view
+            body = StackBody(running, robot, paced, None if config.record is None else show)
         desk = Desk(body, rules, log)
-        operator = Operator(desk, _say, view.panel.ask if view is not None else lambda text: None)
+        operator = Operator(desk, _say, (lambda text: None) if view is None else view.panel.ask)
         if view is not None:
             view.decide = operator.decide
-        operator.listen(terminal() if config.port is None else sys.stdin)
-        if config.port is not None:
-            _say(f"http://127.0.0.1:{config.port}/mcp   Authorization: Bearer {token}\n{HELP}")
-        _serve(desk, config, token)
-    return True
+        operator.listen(terminal() if served and config.port is None else sys.stdin)
+        if served:
+            _serve(desk, config.port, token)
+            return True
+        return _use(desk, config)
+
+
+def _use(desk: Desk, config: McpConfig) -> bool:
+    """Do what is asked; return whether it was done."""
+    if config.replay is not None:
+        rows = list(replay(config.replay, desk.call))
+        for tool, then, now in rows:
+            print(f"{tool:12s} {'did' if then else 'did not'} succeed, {'does' if now else 'does not'} now")
+        return all(then == now for _, then, now in rows)
+    report = Planner(desk.call).do(config.do or "")
+    print(report.text)
+    return report.done
 
 
 def _say(text: str) -> None:
@@ -118,19 +138,19 @@ def _token(config: McpConfig) -> str:
     return token
 
 
-def _serve(desk: Desk, config: McpConfig, token: str) -> None:
+def _serve(desk: Desk, port: int | None, token: str) -> None:
     """Serve on a thread, while this one has the robot; what runs when the client has left is cancelled first."""
     left = threading.Event()
+    if port is not None:
+        _say(f"http://127.0.0.1:{port}/mcp   Authorization: Bearer {token}\n{HELP}")
 
     def serve() -> None:
         try:
-            asyncio.run(serve_stdio(desk) if config.port is None else serve_http(desk, config.port, token))
+            asyncio.run(serve_stdio(desk) if port is None else serve_http(desk, port, token))
         finally:
             left.set()
 
     threading.Thread(target=serve, name="mcp", daemon=True).start()
-    try:
+    with suppress(KeyboardInterrupt):
         desk.run(left.is_set)
-    except KeyboardInterrupt:
-        pass
     desk.leave_all()

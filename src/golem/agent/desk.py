@@ -18,11 +18,12 @@ import numpy as np
 
 from golem.agent.answers import answer, refusal, words
 from golem.agent.audit import AuditLog
-from golem.agent.body import CAMERAS, RESOURCES, Body, Moment, Picture
+from golem.agent.body import Body, Moment, Picture
 from golem.agent.rules import Rules
 from golem.errors import GolemError, shorten, unknown_name
 from golem.interfaces.payloads import Feedback
-from golem.skills.spec import SkillSpec, read_fields
+from golem.package_data import load_data
+from golem.skills.spec import Schema, SkillSpec, read_fields
 from golem.types import Array
 
 LARGEST = 1 << 16
@@ -35,7 +36,19 @@ FELT = 5
 """Moments over which what a hand feels is averaged: see `ForceGuard`."""
 CLEAN_UP = 12.0
 """Time that a skill gets to leave the robot safe when the desk closes [s]: a little more than it has itself."""
-OWN = ("stop", "look", "read")
+
+
+def _own(name: str, description: str, properties: dict[str, Schema]) -> SkillSpec:
+    """Return a tool that is no skill, as if it were one."""
+    required = [key for key, of in properties.items() if "default" not in of]
+    rest = {"properties": properties, "required": required, "additionalProperties": False}
+    return SkillSpec(name, "", description, {"type": "object", **rest})
+
+
+_DATA = load_data(__package__, "tools.yaml")
+RESOURCES: Mapping[str, str] = _DATA["resources"]
+"""What can be read, by name, and what it is."""
+OWN = {name: _own(name, **said) for name, said in _DATA["tools"].items()}
 """Tools that are no skills."""
 STILL = (*OWN, "recall", "remember")
 """Tools that move nothing; they need no lease."""
@@ -161,13 +174,11 @@ class Desk:
         known = call.tool if call.tool in self.tools else shorten(repr(call.tool))
         self._tell("call", call, tool=known, arguments=_sized(call.arguments))
         try:
-            if call.tool == "stop":
-                self._stop(call)
-            elif len(self._recent) >= self.rules.calls:
-                self._refuse(call, f"More than {self.rules.calls} calls a second.")
-            else:
+            if call.tool != "stop":
+                if len(self._recent) >= self.rules.calls:
+                    raise GolemError(f"More than {self.rules.calls} calls a second.")
                 self._recent.append(now)
-                self._admit(call)
+            self._admit(call)
         except GolemError as error:
             self._refuse(call, str(error))
         except Exception as error:  # arguments are a stranger's
@@ -175,30 +186,22 @@ class Desk:
 
     def _admit(self, call: Call) -> None:
         """Answer, ask, begin or refuse; raises what is wrong with the call."""
-        if call.tool not in self.tools:
-            raise unknown_name("tool", shorten(str(call.tool)), self.tools)
         if _size(call.arguments) > LARGEST:
             raise GolemError(f"The arguments have more than {LARGEST} characters.")
+        call.fields = fields = read_fields(self._spec(call.tool), call.arguments)
+        if call.tool == "stop":
+            return self._stop(call)
         if call.tool == "read":
-            name = _only(call, "resource", RESOURCES)
-            self._answer(call, Answer({"success": True, name: self.body.read(name)}))
-            return
-        rule, labels = self.rules.of(call.tool), []
+            name = fields["resource"]
+            return self._answer(call, Answer({"success": True, name: self.body.read(name)}))
         if call.tool == "look":
-            unknown = set(call.arguments) - {"camera", "labels"}
-            camera = str(call.arguments.get("camera", "head"))
-            labels = call.arguments.get("labels", [])
-            if unknown or camera not in CAMERAS:
-                raise GolemError(f"A look has a camera, one of {', '.join(CAMERAS)}, and labels.")
-            call.fields = {"camera": camera}
-            if not labels:
-                self._answer(call, _seen(self.body.picture(camera)))
-                return
-        skill = "remember" if labels else call.tool
-        fields = {"labels": labels, "seconds": LOOK, **call.fields} if labels else dict(call.arguments)
-        call.fields = read_fields(self._spec(skill), fields)
-        problem = self.rules.problem(call.tool, call.fields, self._places(call.fields))
-        if rule.run == "never" and not labels:
+            if not fields["labels"]:
+                return self._answer(call, _seen(self.body.picture(fields["camera"])))
+            call.fields = read_fields(self._spec("remember"), {**fields, "seconds": LOOK})
+            return self._begin(call)
+        rule = self.rules.of(call.tool)
+        problem = self.rules.problem(call.tool, fields, self._places(fields))
+        if rule.run == "never":
             problem = "The rules do not allow this tool."
         if rule.count is not None and self._count[call.tool] >= rule.count:
             problem = f"The rules allow this tool {rule.count} times."
@@ -206,9 +209,8 @@ class Desk:
             raise GolemError(problem)
         if call.tool not in STILL:
             self._lease(call.session)
-        if rule.run == "free" or labels:
-            self._begin(call)
-            return
+        if rule.run == "free":
+            return self._begin(call)
         if any(other.session == call.session for other in self.asked.values()):
             raise GolemError("The operator has not yet answered your last question.")
         call.until = self._clock() + self.rules.patience
@@ -216,10 +218,10 @@ class Desk:
         self._tell("ask", call)
         self.on_ask(f"[{call.number}] {call.tool} {shorten(str(call.fields), 400)}")
 
-    def _spec(self, skill: str) -> SkillSpec:
-        if skill not in self.body.specs:
-            raise unknown_name("skill", skill, self.body.specs)
-        return self.body.specs[skill]
+    def _spec(self, tool: str) -> SkillSpec:
+        if tool not in self.tools:
+            raise unknown_name("tool", shorten(str(tool)), self.tools)
+        return OWN.get(tool) or self.body.specs[tool]
 
     def _places(self, goal: Mapping[str, Any]) -> list[tuple[float, float]]:
         """Return x, y in odom of where a goal sends the robot, or what it holds; raises where that is not known."""
@@ -288,7 +290,7 @@ class Desk:
             self._decide(number, False, "a stop")
         if self._active is not None:
             self.body.cancel()
-        motors = call.arguments.get("motors") is True
+        motors = call.fields["motors"]
         if motors:
             self.body.stop_motors()
         done = "The safety gate was asked for a stop." if motors else "What ran is cancelled."
@@ -353,13 +355,6 @@ def _seen(picture: Picture | None) -> Answer:
         return Answer(refusal("No picture came.", "look"))
     found = [{"label": words(n), "score": s, "position": [x, y, z]} for n, s, x, y, z in picture.found]
     return Answer({"success": True, "frame": "odom", "found": found}, picture.jpeg)
-
-
-def _only(call: Call, name: str, valid: Mapping[str, str]) -> str:
-    value = call.arguments.get(name)
-    if set(call.arguments) != {name} or not isinstance(value, str) or value not in valid:
-        raise unknown_name(name, shorten(str(value)), valid)
-    return value
 
 
 def _size(value: Any) -> int:

@@ -12,8 +12,7 @@ from typing import Any
 
 from golem import __version__
 from golem.agent.answers import words
-from golem.agent.body import RESOURCES
-from golem.agent.desk import Answer, Call, Desk
+from golem.agent.desk import RESOURCES, Answer, Call, Desk
 from golem.agent.tools import tool_specs
 from golem.errors import MissingExtra
 from golem.interfaces.payloads import Feedback

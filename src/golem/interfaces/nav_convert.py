@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from golem.interfaces.nav_payloads import NavPath, OccupancyGrid
-from golem.interfaces.ros_convert import header, pose, time
+from golem.interfaces.ros_convert import header, matrix, pose, seconds, time
 from golem.middleware.ros.msgs import nav_msgs
 from golem.middleware.ros.msgs.geometry_msgs import PoseStamped
 from golem.types import PlanarPose
@@ -22,6 +22,13 @@ def occupancy_grid(grid: OccupancyGrid) -> nav_msgs.OccupancyGrid:
     origin = pose(grid.in_map.origin.matrix())
     info = nav_msgs.MapMetaData(time(grid.t), grid.resolution, columns, rows, origin)
     return nav_msgs.OccupancyGrid(header(grid.t, MAP_FRAME), info, grid.cells.ravel().astype(np.int8))
+
+
+def to_occupancy_grid(message: nav_msgs.OccupancyGrid) -> OccupancyGrid:
+    """Return a map as it was told, in its own frame."""
+    info = message.info
+    cells = np.asarray(message.data, np.int8).reshape(info.height, info.width)
+    return OccupancyGrid(seconds(message.header.stamp), PlanarPose.of(matrix(info.origin)), info.resolution, cells)
 
 
 def path(way: NavPath) -> nav_msgs.Path:

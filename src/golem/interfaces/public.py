@@ -221,7 +221,7 @@ TOPICS: tuple[TopicRow, ...] = (
           topics.BASE, on_demand=True, thinned=True),
     TopicRow("/map", "nav_msgs/msg/OccupancyGrid", "stack", (), LATCHED, None, nav_convert.MAP_FRAME,
           "The map of the floor twice a second, where the stack listens to the LiDAR.",
-          topics.MAP, nav_convert.occupancy_grid, on_demand=True),
+          topics.MAP, nav_convert.occupancy_grid, nav_convert.to_occupancy_grid, on_demand=True),
     TopicRow("/plan", "nav_msgs/msg/Path", "stack", (), DEFAULT, None, nav_convert.MAP_FRAME,
           "The way that the navigator means to go.",
           topics.NAV_PATH, nav_convert.path, on_demand=True),

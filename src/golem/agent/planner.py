@@ -1,0 +1,182 @@
+"""A small planner that needs no model: it knows some sentences, and uses the tools as an agent would."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from golem.agent.audit import read_audit
+from golem.errors import ConfigError, shorten
+
+Use = Callable[[str, Mapping[str, Any]], dict[str, Any]]
+"""Has a tool used with arguments, and returns its answer; `Desk.call`, or a client's."""
+NUMBERS = {"a": 1, "one": 1, "two": 2, "three": 3, "four": 4, "five": 5, "six": 6}
+SPANS = {"second": 1.0, "minute": 60.0, "hour": 3600.0, "day": 86400.0}
+BESIDE = 20
+"""How far beside another thing is, where nobody says [cm]."""
+SURE = 0.5
+"""Score from which on a thing is counted."""
+_THING = r"(?P<thing>[a-z]+)"
+_OTHER = r"(?P<other>[a-z]+)"
+_WHEN = r"(?: (?P<when>yesterday|at first|before|\d+ (?:second|minute|hour|day)s? ago))?"
+SENTENCES: dict[str, str] = {
+    rf"(?:put|move|bring|set) the {_THING} (?:to )?where the {_OTHER} (?P<tense>is|was|stood){_WHEN}": "_to_where",
+    rf"put the {_THING} back(?: where it was)?{_WHEN}": "_back",
+    rf"(?:put|move|set) the {_THING} (?:(?P<cm>\d+) cm )?(?:to the )?(?P<way>left|right) of the {_OTHER}": "_beside",
+    rf"where (?P<tense>is|was) the {_THING}{_WHEN}": "_where",
+    r"how many (?P<thing>[a-z]+?)s? (?:are|stand|lie).*": "_count",
+    rf"(?:bring|get|fetch|give) me the {_THING}": "_bring",
+    rf"(?:find|look for|search for) the {_THING}": "_find",
+    r"take out (?P<number>all|the|\d+|a|(?:the )?(?:one|two|three|four|five|six))(?: (?:of the )?loose)? screws?"
+    r"(?: on the (?P<side>left|right))?(?P<tell>,? and (?:tell me|say) which (?:were|are) tight)?": "_screws",
+}
+"""What is understood, and which script does it."""
+EXAMPLES = "'put the mug where the bowl was yesterday', 'take out the three loose screws on the left'"
+
+
+@dataclass
+class Report:
+    """What came of an errand.
+
+    Attributes:
+        done: whether the planner believes that it was done.
+        text: a sentence.
+        facts: what was found out, as numbers: `place` (x, y, z in the memory's frame [m]), `count`, `taken`, and
+            `tight` and `jammed`, x and y in odom [m] of each.
+    """
+
+    done: bool
+    text: str
+    facts: dict[str, Any] = field(default_factory=dict[str, Any])
+
+
+class Spot(NamedTuple):
+    """Where something is or was, in the memory's frame [m]."""
+
+    x: float
+    y: float
+    z: float
+
+
+class Planner:
+    """Does errands by `use`."""
+
+    def __init__(self, use: Use) -> None:
+        """Use tools by `use`."""
+        self._use = use
+
+    def do(self, words: str) -> Report:
+        """Do what a sentence says.
+
+        Raises:
+            ConfigError: it is none that is known.
+        """
+        sentence = " ".join(words.lower().split()).rstrip(".?!")
+        for pattern, script in SENTENCES.items():
+            found = re.fullmatch(pattern, sentence)
+            if found is not None:
+                return getattr(self, script)(**{k: v for k, v in found.groupdict().items() if v is not None})
+        raise ConfigError(f"The planner does not know how to '{shorten(words)}'; say it as in {EXAMPLES}.")
+
+    def _recall(self, thing: str, tense: str, when: str = "") -> Spot | None:
+        """Return where something is or was."""
+        past = tense in ("was", "stood")
+        question: dict[str, Any] = {"text": thing, "when": "history" if past else "now", "limit": 20}
+        number, _, span = when.partition(" ")
+        if when == "yesterday":
+            question |= {"when": "at", "ago": SPANS["day"]}
+        elif number.isdecimal():
+            question |= {"when": "at", "ago": float(number) * SPANS[span.split()[0].rstrip("s")]}
+        said = self._use("recall", question)
+        places = (said.get("value") or {}).get("places", [])
+        if not places and past and not when:
+            places = (self._use("recall", question | {"when": "now"}).get("value") or {}).get("places", [])
+        if not places:
+            return None
+        best = max(places, key=lambda p: p["first_seen"]) if when == "at first" else places[0]
+        return Spot(best["x"], best["y"], best["z"])
+
+    def _fetch(self, thing: str, to: Spot | None) -> Report:
+        goal = {"text": thing} if to is None else {"text": thing, "to": [to.x, to.y]}
+        said = self._use("fetch", goal)
+        return Report(said["success"], said["reason"]["text"], {} if to is None else {"place": list(to)})
+
+    def _to_where(self, thing: str, other: str, tense: str, when: str = "") -> Report:
+        spot = self._recall(other, tense, when)
+        return Report(False, f"Nothing is remembered of the {other}.") if spot is None else self._fetch(thing, spot)
+
+    def _back(self, thing: str, when: str = "") -> Report:
+        return self._to_where(thing, thing, "was", when)
+
+    def _beside(self, thing: str, way: str, other: str, cm: str = str(BESIDE)) -> Report:
+        spot = self._recall(other, "is")
+        if spot is None:
+            return Report(False, f"Nothing is remembered of the {other}.")
+        aside = 0.01 * float(cm) * (1.0 if way == "left" else -1.0)
+        return self._fetch(thing, spot._replace(y=spot.y + aside))
+
+    def _where(self, thing: str, tense: str, when: str = "") -> Report:
+        spot = self._recall(thing, tense, when)
+        if spot is None:
+            return Report(False, f"Nothing is remembered of the {thing}.")
+        return Report(
+            True, f"The {thing} {tense} at ({spot.x:.2f}, {spot.y:.2f}, {spot.z:.2f}).", {"place": list(spot)}
+        )
+
+    def _count(self, thing: str) -> Report:
+        said = self._use("look", {"camera": "head", "labels": [thing]})
+        count = sum(one["score"] >= SURE for one in said.get("found", []))
+        return Report(said["success"], f"{count} of {thing}.", {"count": count})
+
+    def _bring(self, thing: str) -> Report:
+        return self._fetch(thing, None)
+
+    def _find(self, thing: str) -> Report:
+        said = self._use("search", {"text": thing})
+        places = (said.get("value") or {}).get("places", [])
+        facts = {"place": [places[0][axis] for axis in "xyz"]} if places else {}
+        return Report(said["success"] and bool(places), said["reason"]["text"], facts)
+
+    def _screws(self, number: str, side: str = "", tell: str = "") -> Report:
+        """Pick what is seen on a side, the nearest to the middle first, until so many are out."""
+        state = self._use("read", {"resource": "state"}).get("state", {})
+        base = state.get("base", {"x": 0.0, "y": 0.0, "yaw": 0.0})
+        seen = self._use("look", {"camera": "head", "labels": ["screw"]}).get("found", [])
+        places: list[tuple[float, float, float]] = []
+        for one in seen:
+            dx, dy = one["position"][0] - base["x"], one["position"][1] - base["y"]
+            aside = -math.sin(base.get("yaw", 0.0)) * dx + math.cos(base.get("yaw", 0.0)) * dy
+            if side == "" or (aside > 0.0) == (side == "left"):
+                places.append((abs(aside), *one["position"][:2]))
+        word = number.removeprefix("the ")
+        wanted = int(word) if word.isdecimal() else NUMBERS.get(word, len(places))
+        taken, ends = 0, dict[str, list[list[float]]]()
+        for _, x, y in sorted(places):
+            if taken == wanted and not tell:
+                break
+            said = self._use("pick", {"side": "either", "wanted": [x, y]})
+            taken += said["success"]
+            tried = (said.get("value") or {}).get("tried", [])
+            if not said["success"] and tried:
+                ends.setdefault(tried[-1]["outcome"]["text"], []).append([tried[-1]["x"], tried[-1]["y"]])
+        tight = ends.get("tight", [])
+        text = f"{taken} screws are out" + "".join(f"; {len(places)} {end}" for end, places in ends.items())
+        return Report(taken >= wanted, f"{text}.", {"taken": taken, "tight": tight, "jammed": ends.get("jammed", [])})
+
+
+def replay(file: Path, use: Use) -> Iterator[tuple[str, bool, bool]]:
+    """Have the calls of a recorded session made again, in order; yield each tool, whether it succeeded, then and now.
+
+    Raises:
+        ConfigError: the log cannot be read, or was changed.
+    """
+    entries = list(read_audit(file))
+    ends = {(e["session"], e["number"]): e for e in entries if e["event"] in ("answer", "refuse")}
+    for entry in entries:
+        if entry["event"] == "call" and isinstance(entry["arguments"], dict):
+            then = ends.get((entry["session"], entry["number"]), {}).get("answer", {}).get("success") is True
+            yield entry["tool"], then, use(entry["tool"], entry["arguments"])["success"] is True
