@@ -32,7 +32,7 @@ SENTENCES: dict[str, str] = {
     rf"(?:bring|get|fetch|give) me the {_THING}": "_bring",
     rf"(?:find|look for|search for) the {_THING}": "_find",
     r"take out (?P<number>all|the|\d+|a|(?:the )?(?:one|two|three|four|five|six))(?: (?:of the )?loose)? screws?"
-    r"(?: on the (?P<side>left|right))?(?P<tell>,? and (?:tell me|say) which (?:were|are) tight)?": "_screws",
+    r"(?: on the (?P<side>left|right))?(?:,? and (?:tell me|say) which (?:were|are) tight)?": "_screws",
 }
 """What is understood, and which script does it."""
 EXAMPLES = "'put the mug where the bowl was yesterday', 'take out the three loose screws on the left'"
@@ -141,7 +141,7 @@ class Planner:
         facts = {"place": [places[0][axis] for axis in "xyz"]} if places else {}
         return Report(said["success"] and bool(places), said["reason"]["text"], facts)
 
-    def _screws(self, number: str, side: str = "", tell: str = "") -> Report:
+    def _screws(self, number: str, side: str = "") -> Report:
         """Pick what is seen on a side, the nearest to the middle first, until so many are out."""
         state = self._use("read", {"resource": "state"}).get("state", {})
         base = state.get("base", {"x": 0.0, "y": 0.0, "yaw": 0.0})
@@ -156,7 +156,7 @@ class Planner:
         wanted = int(word) if word.isdecimal() else NUMBERS.get(word, len(places))
         taken, ends = 0, dict[str, list[list[float]]]()
         for _, x, y in sorted(places):
-            if taken == wanted and not tell:
+            if taken == wanted:
                 break
             said = self._use("pick", {"side": "either", "wanted": [x, y]})
             taken += said["success"]

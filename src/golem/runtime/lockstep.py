@@ -104,6 +104,10 @@ class LockstepRunner:
         """The twists that the leg controller in charge can follow."""
         return self._stack.envelope
 
+    def sleep(self, seconds: float) -> None:
+        """Let time pass for the memory alone: a day, as if the robot had been off."""
+        self._stack.remembering.sleep(seconds, self.executor.t)
+
     def request(self, request: OperatorRequest) -> None:
         """Ask something of the safety gate as an operator does: activate, stop, reset; it decides."""
         self._safety.request(request)

@@ -169,6 +169,7 @@ class StackNodes:
         skills: what skills there are.
         running: the one of its nodes that resumes the skill that runs.
         memory: what it remembers; closed with `close` before another stack opens its file.
+        remembering: the one of its nodes that feeds it.
     """
 
     def __init__(
@@ -247,9 +248,9 @@ class StackNodes:
             (Phase.CONTROL, self.legs),
             (Phase.CONTROL, nodes.UpperBodyNode(bus, *make("upper_body"))),
         ]
-        self.nodes.append(
-            (Phase.PERCEIVE, MemoryNode(bus, self.memory, calibration, hears_lidar(stack), epoch, pools.get("memory")))
-        )
+        lidar, pool = hears_lidar(stack), pools.get("memory")
+        self.remembering = MemoryNode(bus, self.memory, calibration, lidar, epoch, pool)
+        self.nodes.append((Phase.PERCEIVE, self.remembering))
         if tuple(odometry.sources) != LEGS_ALONE or hears_lidar(stack):
             self.nodes.append((Phase.PERCEIVE, OdometryNode(bus, odometry, odometry_contract, mount)))
         if hears_lidar(stack):

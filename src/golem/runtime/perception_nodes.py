@@ -251,6 +251,11 @@ class MemoryNode:
                 self._job = self._pool.submit(self._observe, observation), found.t
                 return
 
+    def sleep(self, seconds: float, t: float) -> None:
+        """Let time pass by the memory's clock alone, at time `t` [s], as if the robot had been off."""
+        self._epoch += seconds
+        self._tell(t, "", t, looks=0)
+
     def _observe(self, observation: Observation) -> str:
         """Return why the memory did not take a look; empty where it did."""
         try:

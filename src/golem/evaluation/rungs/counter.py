@@ -187,7 +187,7 @@ def draw_errand(spec: TrialSpec, kitchen: KitchenLayout) -> tuple[str, Literal["
         hand: Side = "left" if spec.case.get("hand", own) == "left" else "right"
         mirror = 1.0 if hand == "left" else -1.0
         others = [thing for thing in things if thing is not chosen]
-        wide = np.array([_radius(thing) + _radius(chosen) for thing in others])
+        wide = np.array([radius(thing) + radius(chosen) for thing in others])
         there = np.array([thing.position[:2] for thing in others]).reshape(-1, 2)
         free = spots[mirror * spots[:, 1] > -ACROSS]
         room = (np.linalg.norm(free[:, None] - there, axis=2) - wide).min(axis=1, initial=np.inf)
@@ -202,7 +202,8 @@ def draw_errand(spec: TrialSpec, kitchen: KitchenLayout) -> tuple[str, Literal["
     return back
 
 
-def _radius(thing: StandingThing) -> float:
+def radius(thing: StandingThing) -> float:
+    """Return the room that a thing takes, its ear included [m]."""
     return thing.size * (KINDS[thing.kind][0] + (EAR if thing.kind == "mug" else 0.0))
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, Protocol, TypeVar
+from typing import Any, ClassVar, Protocol, TypeVar, cast
 
 from golem.errors import ConfigError
 from golem.evaluation.base import DONE, Rung, TrialOutcome, TrialSpec
@@ -95,6 +95,10 @@ class KitchenRung(Rung[O]):
     ) -> Errand:
         """Have the errand of a trial done by a robot that stands or hangs ready."""
 
+    def suits(self, robot: MujocoRobot) -> bool:
+        """Return whether a twin has what the rung is about."""
+        return robot.scene.kitchen is not None
+
     def arranged(self, spec: TrialSpec, stack: Stack) -> Stack:
         """Return `stack` with the world as a trial needs it."""
         return stack
@@ -109,17 +113,17 @@ class KitchenRung(Rung[O]):
         """Run one trial; see `Rung`."""
         stack = self.arranged(spec, self.make_stack(spec.method, spec.profile, spec.overrides))
         running, robot = build(stack, episode_seed(spec.seed, spec.index))
-        if not isinstance(robot, MujocoRobot) or robot.scene.kitchen is None:
+        if not isinstance(robot, MujocoRobot) or not self.suits(robot):
             raise ConfigError(
                 f"Rung {self.name} judges the twin's {self.subject}; robot: {stack.choice('robot').use} is none."
             )
         if self.onlooker is not None:
             self.onlooker(running, robot)
         with closing(robot), closing(Oracle(robot)) as oracle:
-            hangs = let_go(running, robot) if self.balances else None
+            hangs = let_go(running, robot) if stack.on_ground else None
             if hangs is not None:
                 return hangs
-            errand = self.errand(spec, running, robot, robot.scene.kitchen, oracle)
+            errand = self.errand(spec, running, robot, cast(KitchenLayout, robot.scene.kitchen), oracle)
             running.executor.run(running.executor.t + SETTLE, errand.watch.look, due=errand.watch.due)
             recorder = errand.watch.recorder
             if artefacts is not None and recorder is not None:
@@ -135,7 +139,7 @@ class KitchenRung(Rung[O]):
         picture, timings = watch.last_picture(), result.timings
         loss = lost(running, watch.recorder)
         if loss is not None and result.stage not in ABORTED:
-            module = f"lower_body: {stack.choice('lower_body').use}" if self.balances else None
+            module = f"lower_body: {stack.choice('lower_body').use}" if stack.on_ground else None
             detail = f"{loss.detail} The errand itself: {result.reason}"
             return TrialOutcome(False, loss.stage, module, detail, timings, series, picture, loss.trace)
         if verdict.done and result.stage not in ABORTED:
