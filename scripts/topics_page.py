@@ -26,7 +26,6 @@ ABSENT: dict[str, str] = {
         "ground truth, and the robot has none to publish; the estimate is on /odom.",
     "/secondary_imu": "Published for the G1 only; the H1-2's torso IMU is in /lowstate.",
     "/lf/bmsstate": "The twin has no battery; invented figures would be worse than none.",
-    "/wirelesscontroller": "The twin has no remote control.",
 }
 """Topics of the vendor's own simulators that are left out on purpose, and why."""
 # fmt: on

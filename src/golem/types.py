@@ -31,6 +31,8 @@ NUM_JOINTS = 27
 """Body motors of the H1-2, in the order of the vendor's SDK."""
 LEGS = slice(0, 12)
 """Motor indices of the two legs."""
+ARMS = slice(13, 27)
+"""Motors of both arms."""
 UPPER = slice(12, 27)
 """Motor indices of the upper body: torso (1), left arm (7), right arm (7)."""
 

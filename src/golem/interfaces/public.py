@@ -15,16 +15,18 @@ import numpy as np
 
 from golem.interfaces import images, lidar_convert, nav_convert, ros_convert, topics
 from golem.interfaces import ros_convert as convert
-from golem.interfaces.payloads import Exposure, LegCommand
+from golem.interfaces.payloads import ArmSdkCommand, Exposure, LegCommand
 from golem.interfaces.rows import ActionRow, Role, ServiceRow, TopicRow
 from golem.middleware.dds.base import CALLS, DEFAULT, LATCHED, SENSOR, Payload, Qos
 from golem.middleware.ros.msgs.rosgraph_msgs import Clock
 from golem.middleware.ros.msgs.sensor_msgs import CameraInfo
 from golem.middleware.ros.msgs.std_msgs import String
 from golem.middleware.ros.msgs.tf2_msgs import TFMessage
+from golem.middleware.ros.msgs.unitree_go import WirelessController
 from golem.middleware.wire import hg
 from golem.middleware.wire.convert import decode_low_command, decode_low_state, encode_low_command, encode_low_state
-from golem.types import LEGS, NUM_JOINTS, SIDES, BaseEstimate, LowCommand, LowState, Side
+from golem.middleware.wire.struct_layout import WireError
+from golem.types import ARMS, LEGS, NUM_JOINTS, SIDES, BaseEstimate, LowCommand, LowState, Side, Twist
 
 _TO_SERVO = 1
 """Index in `reserve` of the word that says whether the feed-forward torque is left to the servo."""
@@ -56,6 +58,40 @@ def decode_legs(payload: Payload) -> LegCommand:
     whole = decode_low_command(payload, 0.0)
     to_servo = bool(hg.LOW_CMD.read(payload)["reserve"][_TO_SERVO])
     return LegCommand(whole.q[LEGS], whole.kp[LEGS], whole.kd[LEGS], None if to_servo else whole.tau[LEGS])
+
+
+WEIGHT = 27
+"""Motor slot of an `/arm_sdk` command whose q is its weight (unitree_sdk2_python, example/hg/arm_sdk.py)."""
+STICKS = (0.6, 0.3, 0.8)
+"""Velocities at the ends of the remote control's sticks [m/s, m/s, rad/s] [own: what a user of it is used to]."""
+
+
+def decode_arm_sdk(payload: Payload) -> ArmSdkCommand:
+    """Return what a `LowCmd_` on `/arm_sdk` wants; modes do not count, and a checksum of 0 is none, as in examples.
+
+    Raises:
+        WireError: the length or a checksum is wrong, or a value is not finite.
+    """
+    image = hg.LOW_CMD.read(payload)
+    if image["crc"] and not hg.COMMAND_CHECKSUM.holds(payload):
+        raise WireError("The checksum of a command on /arm_sdk is wrong.")
+    motors, weight = image["motor"][ARMS], float(image["motor"]["q"][WEIGHT])
+    values = np.array([motors[name] for name in ("q", "dq", "tau", "kp", "kd")], float)
+    if not (np.isfinite(values).all() and np.isfinite(weight) and (values[3:] >= 0.0).all()):
+        raise WireError("A command on /arm_sdk has a number that is not finite, or a negative gain.")
+    return ArmSdkCommand(min(max(weight, 0.0), 1.0), values)
+
+
+def decode_sticks(message: WirelessController) -> Twist:
+    """Return the velocity that the sticks of a remote control ask for: left one forward and aside, right one to turn.
+
+    Raises:
+        WireError: one is not finite.
+    """
+    sticks = np.array((message.ly, -message.lx, -message.rx), float)
+    if not np.isfinite(sticks).all():
+        raise WireError("A stick on /wirelesscontroller is not finite.")
+    return Twist(*(np.clip(sticks, -1.0, 1.0) * STICKS).tolist())
 
 
 CAMERAS = ("head", "left_hand", "right_hand")
@@ -232,6 +268,14 @@ TOPICS: tuple[TopicRow, ...] = (
           "Velocity for the legs [m/s], [rad/s]; to be repeated at least every 0.5 s, or the robot stands. Ignored "
           "while a skill runs or the gate is shut; who sent any then lets go first: zero, or nothing for 1 s.",
           topics.TWIST, convert.twist, convert.to_twist),
+    TopicRow("/wirelesscontroller", "unitree_go/msg/WirelessController", "user", ("stack",), DEFAULT, None, BASE_FRAME,
+          "Sticks of the remote control: velocities, as on /cmd_vel. Its keys do nothing here.",
+          topics.TWIST, None, decode_sticks),
+    TopicRow("/arm_sdk", "unitree_hg/msg/LowCmd", "user", ("stack",), LOW, None, "",
+          "What a program of the vendor's wants of motors 13 to 26, the legs staying ours; q of slot 27 is its weight, "
+          "0 to 1, which the arms follow by 1 per second, also back when it falls silent. Ignored while a skill runs "
+          "or the gate is shut; who had the arms then lets go first: weight 0, or nothing for 1 s.",
+          topics.ARM_SDK, None, decode_arm_sdk),
     TopicRow("/cmd_height", "std_msgs/msg/Float64", "user", ("stack",), DEFAULT, None, "",
           "Height of base_link over the ground to stand at [m]; NaN is the legs' own. It holds until the next one, a "
           "skill, or a shut gate. Legs that take none keep their own and say so in /legs/status.",

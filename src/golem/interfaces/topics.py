@@ -31,6 +31,8 @@ ARM_TRAJECTORY = Topic("arm_trajectory", payloads.JointTrajectory)
 """From the running skill; it holds until palm targets, or another one, come."""
 ARM_COMMAND = Topic("arm_command", payloads.ArmCommand)
 """From the upper-body controller."""
+ARM_SDK = Topic("arm_sdk", payloads.ArmSdkCommand)
+"""From a program of the vendor's."""
 LEG_COMMAND = Topic("leg_command", payloads.LegCommand)
 """From the lower-body controller."""
 TWIST = Topic("cmd_vel", Twist)

@@ -28,6 +28,7 @@ from golem.middleware.wire.struct_layout import WireError
 from golem.robots.sensors.calibration import calibrations
 from golem.runtime.executor import Executor, Phase, Placed, in_order
 from golem.runtime.live import stack_streams as out
+from golem.runtime.live.arm_sdk import ArmSdk
 from golem.runtime.live.bridge import RejectedMessages, incoming, outgoing
 from golem.runtime.live.clock import RobotClock
 from golem.runtime.live.nav2_bridge import Nav2Bridge
@@ -199,9 +200,13 @@ class StackProcess:
         services = {k: v for s in SIDES for k, v in out.hand_services(self._bus, s, self._now).items()}
         endpoints.serve({**services, "/skill/take_over": lambda _: self._take_over()})
         unheard = () if hears_lidar(stack) else public.LIDAR
-        velocities = Velocities(self._bus, self._now, lambda: self._skills.busy() or not moving(self._bus))
+
+        def closed() -> bool:
+            return self._skills.busy() or not moving(self._bus)
+
+        velocities, self._arms = Velocities(self._bus, self._now, closed), ArmSdk(self._bus, closed, tell)
         self._lidar_imu = OnePerTick(self._bus, topics.LIDAR_IMU, IMU_BACKLOG)
-        takers = {"/cmd_vel": velocities.take, "/cmd_height": velocities.rise}
+        takers = {"/cmd_vel": velocities.take, "/wirelesscontroller": velocities.take, "/cmd_height": velocities.rise}
         takers |= {"/safety/status": self._gate.take, "/livox/imu": self._lidar_imu.take}
         incoming(self._bus, endpoints, self._now, tell, takers, without=("/lowstate", *unheard))
         endpoints.subscribe("/tf_static", lambda message: self._calibration.update(calibrations(message)))
@@ -284,7 +289,9 @@ class StackProcess:
             (Phase.RECEIVE, AnswersIn(bus, service, self._calls, identities)),
             *self._nav2(bus),
             *side.nodes,
-            *outgoing(bus, endpoints, out.encoders(bus, lambda: self._mode_machine, self._calibrated.joint_offset)),
+            *outgoing(
+                bus, endpoints, out.encoders(bus, lambda: self._mode_machine, self._calibrated.joint_offset, self._arms)
+            ),
             (Phase.SEND, CallsOut(bus, service, self._calls, identities)),
             (Phase.SEND, self._skills),
             (Phase.SEND, LegsMonitor(bus, self._tell)),

@@ -191,13 +191,16 @@ MEAN = 5
 SHUT = "The safety gate is shut, see /safety/status."
 
 
-def encoders(bus: Bus, mode_machine: Callable[[], int], joint_offset: Array | None = None) -> Encoders:
+def encoders(
+    bus: Bus, mode_machine: Callable[[], int], joint_offset: Array | None = None, arms: ArmSdk | None = None
+) -> Encoders:
     """Return what makes the messages that take the newest state on `bus` beside their value.
 
     Args:
         bus: of the stack.
         mode_machine: returns the machine type that the robot reports, which its commands repeat.
         joint_offset: (27,) reported minus true joint positions by calibration [rad]; None believes them.
+        arms: who else may have the arms; what a program of the vendor's tells them is in reported positions.
     """
 
     def odometry(estimate: BaseEstimate) -> Odometry | None:
@@ -221,6 +224,8 @@ def encoders(bus: Bus, mode_machine: Callable[[], int], joint_offset: Array | No
             return None
         if joint_offset is not None:
             command = replace(command, q=command.q + joint_offset)
+        if arms is not None:
+            command = arms.blend(command, state.t)
         return encode_low_command(command, mode_machine(), answers=state.t)
 
     force = HandForce()
