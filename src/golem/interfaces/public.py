@@ -125,6 +125,11 @@ def wrench(side: str) -> str:
     return f"/wrench/{side}"
 
 
+def contact(side: str) -> str:
+    """Return the name of the topic of whether something touches a hand."""
+    return f"/contact/{side}"
+
+
 COLOR, COLOR_JPEG = "color/image_raw", "color/image_raw/compressed"
 DEPTH, DEPTH_PNG = "aligned_depth_to_color/image_raw", "aligned_depth_to_color/image_raw/compressedDepth"
 CAMERA_INFO, DEPTH_INFO = "color/camera_info", "aligned_depth_to_color/camera_info"
@@ -192,6 +197,9 @@ def _hand(side: Side) -> tuple[TopicRow, ...]:
               "What the world does to the hand, by the torques that the arm's motors report: a mean of 50 ms, for an "
               "arm that moves slowly. Errors of masses and friction, and what is held, are in it: look at its changes.",
               topics.LOW_STATE, on_demand=True, thinned=True),
+        TopicRow(contact(side), own + "HandContact", "stack", (), DEFAULT, None, frame,
+              "Whether something touches the hand: at every change, and ten times a second, with the covariance of "
+              "what is felt.", topics.LOW_STATE, on_demand=True),
     )
 
 

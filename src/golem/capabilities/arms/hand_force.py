@@ -40,6 +40,12 @@ class HandForce:
         wrench = self.wrench(side, q, tau)
         return np.asarray(self._arm.placement(side).rotation @ wrench[:3], dtype=np.float64)
 
+    def covariance(self, side: Side, q: Array) -> Array:
+        """Return the (6, 6) covariance of `wrench`, in its frame, by the two standard deviations above."""
+        self._arm.update(q)
+        J = self._arm.jacobian(side)[:, ARM_COLUMNS[side]]
+        return TORQUE**2 * np.linalg.inv(J @ J.T + np.diag((TORQUE / WRENCH) ** 2))
+
     def wrench(self, side: Side, q: Array, tau: Array) -> Array:
         """Return the (6,) force [N] and moment [N m] of a hand on what it touches, in its grasp frame."""
         arm, columns = self._arm, ARM_COLUMNS[side]
@@ -48,3 +54,44 @@ class HandForce:
         J = arm.jacobian(side)[:, columns]
         likely = J @ J.T + np.diag((TORQUE / WRENCH) ** 2)
         return np.linalg.solve(likely, J @ rest[columns])
+
+
+QUICK, SLOW = 0.012, 0.6
+"""Time constants of what is felt now, and of what was there before [s] [own: one tick is off by 2 to 3 N]."""
+TOUCH, LEFT = 2.2, 1.2
+"""Change of the force from which on something touches a hand, and below which nothing does any more [N]."""
+MOTION = 12.0
+"""How much more it takes of an arm that moves, by the speed of its fastest joint [N s/rad]: friction and inertia."""
+
+
+class ContactSense:
+    """Tells when something touches a hand: when its force changes by more than motion and noise explain.
+
+    Attributes:
+        touching: whether something does.
+        change: (6,) the wrench of the hand on the world since before the touch, in its grasp frame [N, N m].
+    """
+
+    def __init__(self, side: Side) -> None:
+        """Sense the hand on `side`."""
+        self._side: Side = side
+        self._feel = HandForce()
+        self._quick: Array | None = None
+        self._slow, self._t = np.zeros(6), 0.0
+        self.touching, self.change = False, np.zeros(6)
+
+    def step(self, t: float, q: Array, dq: Array, tau: Array) -> bool:
+        """Feel at time `t` [s] with (15,) joints [rad], their speeds and torques; return whether `touching` changed."""
+        wrench, dt = self._feel.wrench(self._side, q, tau), t - self._t
+        self._t = t
+        if self._quick is None or not 0.0 < dt < SLOW:
+            self._quick, self._slow = wrench, wrench
+            return False
+        self._quick = self._quick + min(1.0, dt / QUICK) * (wrench - self._quick)
+        self.change = self._quick - self._slow
+        force, before = float(np.linalg.norm(self.change[:3])), self.touching
+        margin = MOTION * float(np.abs(dq[ARM_COLUMNS[self._side]]).max())
+        self.touching = force > (LEFT if before else TOUCH) + margin
+        if not self.touching:
+            self._slow = self._slow + min(1.0, dt / SLOW) * (self._quick - self._slow)
+        return self.touching != before

@@ -11,7 +11,7 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from golem.capabilities.arms.hand_force import HandForce
+from golem.capabilities.arms.hand_force import ContactSense, HandForce
 from golem.interfaces import images, public, topics
 from golem.interfaces import ros_convert as convert
 from golem.interfaces.images import Lens, Pairing, to_lens
@@ -21,6 +21,7 @@ from golem.middleware.bus import Bus, Topic
 from golem.middleware.ros.future import Future
 from golem.middleware.ros.msgs import golem_interfaces, sensor_msgs
 from golem.middleware.ros.msgs.geometry_msgs import WrenchStamped
+from golem.middleware.ros.msgs.golem_interfaces import HandContact
 from golem.middleware.ros.msgs.nav_msgs import Odometry
 from golem.middleware.ros.msgs.std_srvs import Trigger_Request, Trigger_Response
 from golem.middleware.ros.msgs.tf2_msgs import TFMessage
@@ -31,6 +32,7 @@ from golem.middleware.wire.convert import encode_low_command
 from golem.robots.model import magpie_model
 from golem.robots.model.imu_mount import sensed_base_rate
 from golem.robots.sensors.cameras import CAMERAS
+from golem.runtime.live.arm_sdk import ArmSdk
 from golem.runtime.live.bridge import Encoders
 from golem.runtime.live.node_setup import log_line
 from golem.runtime.live.role_endpoints import RoleEndpoints
@@ -41,6 +43,8 @@ from golem.types import SIDES, TICK, UPPER, Array, BaseEstimate, LowCommand, Low
 
 T = TypeVar("T")
 
+TOLD = 0.1
+"""Time between two reports of what touches a hand where nothing changes [s]."""
 AHEAD = 0.05
 """How far ahead of the robot's time an image may be stamped [s] [own]: more, and its clock is another."""
 
@@ -230,13 +234,24 @@ def encoders(
 
     force = HandForce()
     felt = {public.wrench(side): partial(_felt, force, side, deque(maxlen=MEAN)) for side in SIDES}
-    return {"/odom": odometry, "/tf": frames, "/safety/lowcmd_in": request, **felt}
+    touched = {public.contact(side): partial(_touched, ContactSense(side), force, side) for side in SIDES}
+    return {"/odom": odometry, "/tf": frames, "/safety/lowcmd_in": request, **felt, **touched}
 
 
 def _felt(force: HandForce, side: Side, last: deque[Array], state: LowState) -> WrenchStamped:
     """Return the mean of `last`, the wrenches that a hand felt of late, with that of `state`."""
     last.append(-force.wrench(side, state.q[UPPER], state.tau[UPPER]))
     return convert.wrench(state.t, f"{side}_gripper", np.mean(last, axis=0))
+
+
+def _touched(sense: ContactSense, force: HandForce, side: Side, state: LowState) -> HandContact | None:
+    """Return whether something touches a hand, where that has changed, and every `TOLD`."""
+    q = state.q[UPPER]
+    changed = sense.step(state.t, q, state.dq[UPPER], state.tau[UPPER])
+    if not changed and round(state.t / TICK) % round(TOLD / TICK):
+        return None
+    stamped = convert.wrench(state.t, f"{side}_gripper", -sense.change)
+    return HandContact(stamped.header, sense.touching, stamped.wrench, force.covariance(side, q).ravel())
 
 
 def hand_services(bus: Bus, side: Side, now: Callable[[], float]) -> dict[str, Callable[[Any], Any]]:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from golem.middleware.ros.message import Message
 from golem.middleware.ros.msgs.builtin_interfaces import Duration, Time
-from golem.middleware.ros.msgs.geometry_msgs import Point, Pose, PoseStamped, Twist, Vector3
+from golem.middleware.ros.msgs.geometry_msgs import Point, Pose, PoseStamped, Twist, Vector3, Wrench
 from golem.middleware.ros.msgs.std_msgs import Header
 
 @dataclass(slots=True, eq=False)
@@ -177,6 +177,23 @@ class HandCommand(Message):
     header: Header = ...
     gap: float = ...
     force: float = ...
+
+@dataclass(slots=True, eq=False)
+class HandContact(Message):
+    """What the world does to a hand, how sure that is, and whether something touches it.
+
+    Attributes:
+        header: frame_id is the hand's grasp frame
+        touching: whether its force has changed by more than free motion explains
+        wrench: since before the touch; see /wrench
+        covariance: (6, 6) of force and moment, row by row [N^2, N^2 m, N^2 m^2]
+    """
+
+    __msgtype__: ClassVar[str]
+    header: Header = ...
+    touching: bool = ...
+    wrench: Wrench = ...
+    covariance: NDArray[np.float64] = ...
 
 @dataclass(slots=True, eq=False)
 class HandState(Message):
