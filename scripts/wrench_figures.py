@@ -1,7 +1,7 @@
 """Measures what the hands feel: `python scripts/wrench_figures.py [SECONDS]`, a twin that stands, pushed at its palms.
 
-Prints the RMS error of the force of a known push [N], the delay from a push to its contact event [s], and how many events
-come while nothing touches the hands in so many seconds of standing, and of walking.
+Prints the RMS error of the force of a known push [N], the delay from a push to its contact event [s], and how many
+events come while nothing touches the hands in so many seconds of standing, and of walking.
 """
 
 from __future__ import annotations

@@ -31,7 +31,7 @@ SENTENCES: dict[str, str] = {
     r"how many (?P<thing>[a-z]+?)s? (?:are|stand|lie).*": "_count",
     rf"(?:bring|get|fetch|give) me the {_THING}": "_bring",
     rf"(?:find|look for|search for) the {_THING}": "_find",
-    r"take out (?P<number>all|the|\d+|a|(?:the )?(?:one|two|three|four|five|six))(?: (?:of the )?loose)? screws?"
+    r"take out (?:the )?(?:(?P<number>all|\d+|a|one|two|three|four|five|six) )?(?:of the )?(?:loose )?screws?"
     r"(?: on the (?P<side>left|right))?(?:,? and (?:tell me|say) which (?:were|are) tight)?": "_screws",
 }
 """What is understood, and which script does it."""
@@ -141,7 +141,7 @@ class Planner:
         facts = {"place": [places[0][axis] for axis in "xyz"]} if places else {}
         return Report(said["success"] and bool(places), said["reason"]["text"], facts)
 
-    def _screws(self, number: str, side: str = "") -> Report:
+    def _screws(self, number: str = "all", side: str = "") -> Report:
         """Pick what is seen on a side, the nearest to the middle first, until so many are out."""
         state = self._use("read", {"resource": "state"}).get("state", {})
         base = state.get("base", {"x": 0.0, "y": 0.0, "yaw": 0.0})
@@ -152,8 +152,7 @@ class Planner:
             aside = -math.sin(base.get("yaw", 0.0)) * dx + math.cos(base.get("yaw", 0.0)) * dy
             if side == "" or (aside > 0.0) == (side == "left"):
                 places.append((abs(aside), *one["position"][:2]))
-        word = number.removeprefix("the ")
-        wanted = int(word) if word.isdecimal() else NUMBERS.get(word, len(places))
+        wanted = int(number) if number.isdecimal() else NUMBERS.get(number, len(places))
         taken, ends = 0, dict[str, list[list[float]]]()
         for _, x, y in sorted(places):
             if taken == wanted:

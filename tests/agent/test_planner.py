@@ -1,0 +1,103 @@
+"""Sentences become calls of tools, and a recorded session can be made again."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tests.agent.fake_body import Rig
+
+from golem.agent.answers import words
+from golem.agent.planner import Planner, replay
+from golem.agent.rules import Rules
+from golem.errors import ConfigError
+from golem.evaluation.rungs.errands import SUITE
+
+PLACE = {"x": 0.5, "y": 0.2, "z": -0.1, "first_seen": 90_000.0, "last_seen": 86_000.0}
+
+
+class Robot:
+    """Answers as one whose memory has one place of everything, and before which stand three screws."""
+
+    def __init__(self, tight: int = 0) -> None:
+        self.calls: list[tuple[str, Mapping[str, Any]]] = []
+        self.left = tight
+
+    def __call__(self, tool: str, arguments: Mapping[str, Any]) -> dict[str, Any]:
+        self.calls.append((tool, arguments))
+        done = {"success": True, "reason": words("Done."), "value": {"places": [PLACE]}}
+        if tool == "read":
+            return {"success": True, "state": {"base": {"x": 0.0, "y": 0.0, "yaw": 0.0}}}
+        if tool == "look":
+            seen = [(0.4, 0.3), (0.4, 0.1), (0.4, -0.2)]
+            return {"success": True, "found": [{"score": 0.9, "position": [x, y, 0.0]} for x, y in seen]}
+        if tool == "pick" and self.left > 0:
+            self.left -= 1
+            x, y = arguments["wanted"]
+            tried = [{"outcome": words("tight"), "x": x, "y": y}]
+            return {"success": False, "reason": words("It is tight."), "value": {"tried": tried}}
+        return done
+
+
+def said(sentence: str, tight: int = 0) -> tuple[Any, list[tuple[str, Mapping[str, Any]]]]:
+    robot = Robot(tight)
+    return Planner(robot).do(sentence), robot.calls
+
+
+def test_a_thing_is_brought_to_where_another_was() -> None:
+    report, calls = said("Put the mug where the bowl was yesterday.")
+    assert calls == [
+        ("recall", {"text": "bowl", "when": "at", "limit": 20, "ago": 86400.0}),
+        ("fetch", {"text": "mug", "to": [0.5, 0.2]}),
+    ]
+    assert report.done
+    assert said("move the can where the bowl was 2 hours ago")[1][0][1]["ago"] == 7200.0
+    assert said("put the can back")[1][0][1] == {"text": "can", "when": "history", "limit": 20}
+    assert said("set the can 16 cm right of the mug")[1][1][1]["to"] == pytest.approx([0.5, 0.04])
+
+
+def test_screws_of_a_side_are_tried_until_enough_are_out() -> None:
+    report, calls = said("take out one loose screw on the left and tell me which were tight", tight=1)
+    picks = [a["wanted"] for tool, a in calls if tool == "pick"]
+    assert picks == [[0.4, 0.1], [0.4, 0.3]] and report.done
+    assert report.facts == {"taken": 1, "tight": [[0.4, 0.1]], "jammed": []} and "tight" in report.text
+    report, calls = said("take out all loose screws")
+    assert report.facts["taken"] == 3
+    assert not said("take out the three loose screws on the right")[0].done
+
+
+def test_questions_are_answered() -> None:
+    assert said("where is the mug?")[0].facts == {"place": [0.5, 0.2, -0.1]}
+    assert said("how many mugs are on the counter")[0].facts == {"count": 3}
+    assert said("find the mug")[0].facts == {"place": [0.5, 0.2, -0.1]}
+    assert said("bring me the mug")[1] == [("fetch", {"text": "mug"})]
+
+
+def test_what_is_not_understood_is_said_with_examples() -> None:
+    for sentence in ("", "dance", "put the mug where the bowl was yesterday; and stop", "x" * 10_000):
+        with pytest.raises(ConfigError, match="say it as in"):
+            said(sentence)
+
+
+def test_every_errand_of_the_suite_is_understood() -> None:
+    assert len(SUITE) == 30
+    for errand in SUITE.values():
+        sentence = errand["words"].format(a="mug", b="bowl", cm=16, way="left", n=2, side="left")
+        assert said(sentence)[1], sentence
+        assert errand["judge"]
+
+
+def test_a_session_is_made_again(tmp_path: Path) -> None:
+    (tmp_path / "then").mkdir()
+    (tmp_path / "now").mkdir()
+    then = Rig(tmp_path / "then", Rules(default="free", calls=100))
+    for tool, arguments in (("go", {"x": 1.0}), ("go", {"x": "no"}), ("read", {"resource": "state"}), ("nope", {})):
+        then.desk.call(tool, arguments)
+    now = Rig(tmp_path / "now", Rules(default="free", calls=100))
+    rows = list(replay(then.file, now.desk.call))
+    assert [(a, b) for _, a, b in rows] == [(True, True), (False, False), (True, True), (False, False)]
+    assert now.body.began == then.body.began
+    never = Rig(tmp_path, Rules(default="never", calls=100))
+    assert [b for _, _, b in replay(then.file, never.desk.call)] == [False, False, True, False]
