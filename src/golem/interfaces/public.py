@@ -281,7 +281,7 @@ TOPICS: tuple[TopicRow, ...] = (
           topics.TWIST, None, decode_sticks),
     TopicRow("/arm_sdk", "unitree_hg/msg/LowCmd", "user", ("stack",), LOW, None, "",
           "What a program of the vendor's wants of motors 13 to 26, the legs staying ours; q of slot 27 is its weight, "
-          "0 to 1, which the arms follow by 1 per second, also back when it falls silent. Ignored while a skill runs "
+          "0 to 1, which the arms follow by 0.5 a second, also back when it falls silent. Ignored while a skill runs "
           "or the gate is shut; who had the arms then lets go first: weight 0, or nothing for 1 s.",
           topics.ARM_SDK, None, decode_arm_sdk),
     TopicRow("/cmd_height", "std_msgs/msg/Float64", "user", ("stack",), DEFAULT, None, "",

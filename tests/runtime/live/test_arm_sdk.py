@@ -72,29 +72,29 @@ class Rig:
 
 def test_the_weight_comes_and_goes_without_a_jump_and_the_legs_stay_ours() -> None:
     rig = Rig()
-    rows = np.vstack([rig.run(1.5, 1.0), rig.run(1.5, 0.0), rig.run(1.2, 1.0), rig.run(2.0, None), rig.run(0.1, 0.0)])
+    rows = np.vstack([rig.run(2.5, 1.0), rig.run(2.5, 0.0), rig.run(2.2, 1.0), rig.run(3.0, None), rig.run(0.1, 0.0)])
     assert np.abs(np.diff(rows, axis=0)).max() < 0.02
     arms = rows[:, ARMS.start]
-    assert arms.min() == pytest.approx(-1.5) and arms[1499] == pytest.approx(0.5, abs=0.01)
+    assert arms.min() == pytest.approx(-1.5) and arms[2499] == pytest.approx(0.5, abs=0.01)
     assert arms[-1] == 0.5 and (rows[:, : ARMS.start] == 0.5).all()
 
 
 def test_who_has_the_arms_while_a_skill_runs_lets_go_first() -> None:
     rig = Rig()
-    rig.run(1.2, 1.0)
+    rig.run(2.2, 1.0)
     rig.closed = True
-    assert np.abs(np.diff(rig.run(1.2, 1.0), axis=0)).max() < 0.02 and rig.arms.weight == 0.0
+    assert np.abs(np.diff(rig.run(2.2, 1.0), axis=0)).max() < 0.02 and rig.arms.weight == 0.0
     rig.closed = False
-    rig.run(1.2, 1.0)
+    rig.run(2.2, 1.0)
     assert rig.arms.weight == 0.0
     rig.run(0.1, 0.0)
-    rig.run(1.2, 1.0)
+    rig.run(2.2, 1.0)
     assert rig.arms.weight == 1.0
     rig.closed = True
-    rig.run(1.2, 1.0)
+    rig.run(2.2, 1.0)
     rig.closed = False
     rig.run(1.1, None)
-    rig.run(1.2, 1.0)
+    rig.run(2.2, 1.0)
     assert rig.arms.weight == 1.0
 
 
@@ -117,11 +117,11 @@ def test_arms_of_the_twin_follow_a_program_on_the_domain(active: Live) -> None:
             live.run(0.02)
             track.append(float(live.robot.joints()[0][elbow]))
 
-    program(1.2, 1.0)
+    program(2.2, 1.0)
     there = live.robot.joints()[0].copy()
     assert np.abs(there[ARMS] - home[ARMS]).max() > 0.3
     np.testing.assert_allclose(there[LEGS], home[LEGS], atol=0.1)
-    program(1.5, 0.0)
+    program(2.5, 0.0)
     live.run(1.0)
     assert np.abs(live.robot.joints()[0][ARMS] - home[ARMS]).max() < 0.1
     assert live.state.value == "active"

@@ -8,10 +8,11 @@ from dataclasses import replace
 from golem.interfaces import topics
 from golem.interfaces.payloads import ArmSdkCommand
 from golem.middleware.bus import Bus, News
-from golem.types import ARMS, LowCommand
+from golem.types import ARMS, TICK, LowCommand
 
-RATE = 1.0
-"""How fast the weight follows what is asked for [1/s] [own: arms that differ by 2 rad then move by 4 mrad a tick]."""
+RATE = 0.5
+"""How fast the weight follows what is asked for [1/s]: as xr_teleoperate lets go; arms that differ by 4 rad then move by
+4 mrad a tick."""
 SILENCE = 0.25
 """Time without a command after which the arms go back [s] [own: the examples send one each 20 ms]."""
 LET_GO = 1.0
@@ -49,7 +50,7 @@ class ArmSdk:
             self._held, wanted = self._held or wanted > NOTHING, 0.0
         elif wanted <= NOTHING and (silent > LET_GO or (silent <= SILENCE and self._newest is not None)):
             self._held = False
-        before, step = self.weight, RATE * dt
+        before, step = self.weight, RATE * min(dt, TICK)
         wanted = 0.0 if self._held else wanted
         self.weight = min(max(wanted, before - step), before + step)
         if self._newest is None or self.weight <= 0.0:
