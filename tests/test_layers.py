@@ -35,7 +35,8 @@ LAYERS = (
     ("skills",),
     ("stack", "runtime", "provenance"),
     ("agent",),
-    ("evaluation", "training", "dashboard", "doctor", "option_list"),
+    ("evaluation", "dashboard", "doctor", "option_list"),
+    ("datasets", "teleop", "training"),
     ("run", "demo", "demo_walk", "agent_command", "cli", "__main__"),
 )
 LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}

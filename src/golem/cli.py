@@ -159,6 +159,24 @@ TRAINERS = {
 """What can be trained, and the module that does it."""
 
 
+def _dataset(words: list[str]) -> int:
+    """Data sets in LeRobot's format: `dataset record`, export, import, check, delete, split, merge."""
+    _prepare_graphics()
+    return _one_of(words, "dataset", "thing to do with a data set", DATASETS)
+
+
+DATASETS = {
+    "record": ("golem.datasets.commands", "DemonstrateConfig", "run_demonstrate"),
+    "export": ("golem.datasets.commands", "ExportConfig", "run_export"),
+    "import": ("golem.datasets.commands", "ImportConfig", "run_import"),
+    "check": ("golem.datasets.commands", "CheckDatasetConfig", "run_check_dataset"),
+    "delete": ("golem.datasets.commands", "DeleteConfig", "run_delete"),
+    "split": ("golem.datasets.commands", "SplitConfig", "run_split"),
+    "merge": ("golem.datasets.commands", "MergeConfig", "run_merge"),
+}
+"""What is done with a data set."""
+
+
 def _safety(words: list[str]) -> int:
     """Run a robot's safety gate; `safety activate|stop|reset|...` asks it, `safety console` is quick."""
     from golem.runtime.live import operator
@@ -272,6 +290,7 @@ COMMANDS: dict[str, Callable[[list[str]], int]] = {
     "reach": _command("Show where the hands can be: table, picture, and the map that skills ask.",
                       "golem.evaluation.speed.reach_command", "ReachConfig:run_reach"),
     "train": _train,
+    "dataset": _dataset,
     "twin": _command("Put the simulated robot on a DDS domain, with the wall clock.",
                      "golem.runtime.live.process", "TwinConfig:run_twin", True),
     "safety": _safety,

@@ -77,6 +77,8 @@ NAV2_REPLY = Topic("nav2/reply", nav_payloads.Nav2Reply)
 """From whoever speaks to Nav2, at every change."""
 NAV2_TWIST = Topic("nav2/cmd_vel", nav_payloads.Nav2Twist)
 """From Nav2's controller."""
+CAMERAS_WANTED = Topic("cameras_wanted", tuple)
+"""Names of cameras that somebody wants exposed though nothing is looked for: who records, or a policy."""
 REMOVALS = Topic("removals", str)
 """From a gantry that loosens fasteners: a sentence before each."""
 FEEDBACK = Topic("skill/feedback", payloads.Feedback)

@@ -177,11 +177,11 @@ def _message(fault: ModuleFault) -> ModuleFaultMsg:
 
 
 def detection_requested(bus: Bus, camera: str) -> Callable[[], bool]:
-    """Return whether a skill wants the frames of a camera of its own process."""
+    """Return whether a skill, or who records, wants the frames of a camera of its own process."""
 
     def wanted() -> bool:
         request = bus.latest(topics.detection_request(camera))
-        return request is not None and bool(request.labels)
+        return (request is not None and bool(request.labels)) or camera in (bus.latest(topics.CAMERAS_WANTED) or ())
 
     return wanted
 
