@@ -210,8 +210,8 @@ def write_bag(frames: Mapping[str, NDArray[Any]], fps: int, path: Path) -> int:
     """Write recorded states as a bag, which `robot: {use: replay}` and ROS tools read; returns its messages.
 
     Args:
-        frames: (n, ...) values by feature: `observation.state`, `observation.effort`, and (n, height, width) depths with
-            (n, height, width, 3) pictures of cameras, if any.
+        frames: (n, ...) values by feature: `observation.state`, `observation.effort`, and (n, height, width) depths
+            with (n, height, width, 3) pictures of cameras, if any.
         fps: frames per second.
         path: folder of the bag.
 
@@ -258,7 +258,7 @@ def write_bag(frames: Mapping[str, NDArray[Any]], fps: int, path: Path) -> int:
 
 
 def _upright(up: NDArray[Any]) -> NDArray[Any]:
-    """Return the rotation (3, 3) into a level frame of a base in which the vertical is `up` (3,); its heading is lost."""
+    """Return the rotation (3, 3) into a level frame of a base in which `up` (3,) is vertical; its heading is lost."""
     x = np.array([1.0, 0.0, 0.0]) - up[0] * up
     x /= max(float(np.linalg.norm(x)), 1e-9)
     return np.array([x, np.cross(up, x), up])

@@ -39,8 +39,8 @@ INDICES = {
 }
 """What every data set has beside its features, with their types."""
 CODEC, GOP, CRF = "libsvtav1", 10, 30
-"""Encoder (BSD, as LeRobot's own), distance of key frames, quality [own: 11 ms of CPU a VGA frame; LeRobot's distance of 2
-takes 60]."""
+"""Encoder (BSD, as LeRobot's own), distance of key frames, quality [own: 11 ms of CPU a VGA frame; LeRobot's
+distance of 2 takes 60]."""
 
 
 class DatasetError(GolemError):
@@ -181,7 +181,7 @@ def statistics(values: np.ndarray[Any, Any]) -> dict[str, Any]:
 
 
 def picture_statistics(counts: np.ndarray[Any, Any], frames: int) -> dict[str, Any]:
-    """Return the same of pictures, by channel, from their histogram (3, 256); values from 0 to 1, as LeRobot has them."""
+    """Return the same of pictures, by channel, from their histogram (3, 256), from 0 to 1 as LeRobot has them."""
     level = np.arange(256) / 255.0
     share = counts / counts.sum(1, keepdims=True)
     mean = share @ level

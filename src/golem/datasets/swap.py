@@ -1,4 +1,4 @@
-"""Changes a folder whole or not at all: the new one is made beside it of hard links, and takes its place in one step."""
+"""Changes a folder whole or not at all: the new one is made beside it of hard links, and takes its place at once."""
 
 from __future__ import annotations
 

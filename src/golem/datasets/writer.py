@@ -136,8 +136,8 @@ class DatasetWriter:
                 # By way of JSON, where a tuple is a list.
                 if there.fps != self._fps or there.info["features"] != json.loads(json.dumps(here)):
                     raise DatasetError(
-                        f"The data set {root} was recorded otherwise ({there.fps} fps; {', '.join(there.features)}), and "
-                        "an episode like this does not fit; give another folder."
+                        f"The data set {root} was recorded otherwise ({there.fps} fps; {', '.join(there.features)}), "
+                        "and an episode like this does not fit; give another folder."
                     )
                 self.episodes = len(there.episodes)
         except BaseException:

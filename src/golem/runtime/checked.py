@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from typing import TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
 
 from golem.capabilities.arms.base import check_pose
 from golem.capabilities.arms.trajectory import check_trajectory
-from golem.capabilities.grasping.base import Grasp, GraspMethod, Gripper, ServoLaw, ServoStatus, ServoStep
+from golem.capabilities.grasping.base import Grasp, GraspMethod, Gripper, SeeingLaw, ServoLaw, ServoStatus, ServoStep
 from golem.capabilities.memory.base import EVIDENCES, HasPlaces, Memory, MemoryFault, Observation, Place, When
 from golem.capabilities.navigation.base import Navigator, NavInputs
 from golem.capabilities.planning.base import NUM_JOINTS, ArmPlanner, Plan, PlanRefused, PlanRequest
@@ -20,7 +20,7 @@ from golem.interfaces.nav_payloads import NavStep
 from golem.interfaces.payloads import JointTrajectory
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.nodes import MIN_RATE
-from golem.types import Array, LocalizedObject, PlanarPose, Twist
+from golem.types import Array, LocalizedObject, PlanarPose, Side, Twist
 
 T = TypeVar("T")
 
@@ -53,6 +53,8 @@ class CheckedGraspMethod:
         if law is None:
             return None
         self._contract.satisfies(law, ServoLaw)
+        if isinstance(law, SeeingLaw):
+            return CheckedSeeingLaw(law, self._contract)
         return CheckedServoLaw(law, self._contract)
 
 
@@ -75,6 +77,21 @@ class CheckedServoLaw:
         self._contract.array("target", step.target, 3)
         self._contract.number("sigma", step.sigma, minimum=0.0)
         return step
+
+
+class CheckedSeeingLaw(CheckedServoLaw):
+    """A `SeeingLaw` whose faults name the module."""
+
+    def __init__(self, law: SeeingLaw, contract: ContractCheck) -> None:
+        """Watch `law`."""
+        super().__init__(law, contract)
+        self.cameras, self.width, self.prompt, self._see = law.cameras, law.width, law.prompt, law.see
+
+    def see(
+        self, t: float, side: Side, T_odom_base: Array, observe: Callable[[], dict[str, Any] | None], live: bool
+    ) -> None:
+        """Let it look; see `SeeingLaw`."""
+        self._contract.call(self._see, t, side, T_odom_base, observe, live)
 
 
 class CheckedPlanner:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -113,6 +114,34 @@ class ServoLaw(Protocol):
             t: present time [s].
             sightings: objects of one new frame, in no order; None when no new frame came.
             T_odom_gripper: (4, 4) where the gripper is by the measured joints.
+        """
+        ...
+
+
+@runtime_checkable
+class SeeingLaw(ServoLaw, Protocol):
+    """A servo law that looks for itself instead of being told what a localizer found.
+
+    Attributes:
+        cameras: whose pictures it wants, `width` pixels wide; 0 is as they are.
+        prompt: what is to be done, for who listens.
+    """
+
+    cameras: tuple[str, ...]
+    width: int
+    prompt: str
+
+    def see(
+        self, t: float, side: Side, T_odom_base: Array, observe: Callable[[], dict[str, Any] | None], live: bool
+    ) -> None:
+        """Look, before each step.
+
+        Args:
+            t: present time [s].
+            side: of the hand at work.
+            T_odom_base: (4, 4) pose of base_link in odom.
+            observe: returns what there is to be seen, by the names of a data set; None while something is missing.
+            live: whether time passes by itself, so that nobody may wait here.
         """
         ...
 

@@ -42,8 +42,8 @@ ACTION: dict[str, str] = {
     "base.wz": "rad/s",
     "base.height": "m",
 }
-"""Name -> unit of what is commanded: palm targets in base_link, openings (0 closes), torso, twist of the base, its height
-(0: the legs' own)."""
+"""Name -> unit of what is commanded: palm targets in base_link, openings (0 closes), torso, twist of the base, its
+height (0: the legs' own)."""
 EFFORT: dict[str, str] = {f"{joint}.effort": "N m" for joint in _JOINTS}
 COMMAND: dict[str, str] = {f"{joint}.target": "rad" for joint in _JOINTS}
 """Name -> unit of the joint targets that passed the safety gate."""

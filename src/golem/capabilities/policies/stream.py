@@ -1,0 +1,75 @@
+"""The actions of a policy as time passes: chunks that are asked for ahead, and come as late as they are declared."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Any, Protocol
+
+from golem.capabilities.policies.openpi import PolicyConfig
+from golem.capabilities.policies.vectors import check_actions
+from golem.errors import ServiceUnavailable
+from golem.types import Array
+
+
+class Policy(Protocol):
+    """Whoever answers observations."""
+
+    def infer(self, observation: Mapping[str, Any]) -> Any:
+        """Return a chunk of actions (n, 25) for an observation, see `golem.capabilities.policies.vectors`.
+
+        Raises:
+            ServiceUnavailable: there is no answer.
+        """
+        ...
+
+
+class ActionStream:
+    """Asks a policy on a thread of its own, and says which action is due.
+
+    On the clock the answer to an observation of time t counts from t + latency on, whatever the machine needed; live it
+    counts when it comes. Its i-th action is for t + i / fps: those that are over by then are left out.
+    """
+
+    def __init__(self, policy: Policy, config: PolicyConfig) -> None:
+        """Ask `policy`."""
+        self._policy, self._config = policy, config
+        self._pool = ThreadPoolExecutor(1, "policy")
+        self._job: tuple[Future[Any], float] | None = None
+        self._chunk: Array | None = None
+        self._begun = 0.0
+
+    def step(self, t: float, observe: Callable[[], dict[str, Any] | None], live: bool) -> Array | None:
+        """Return the action (25,) of time `t` [s]; None before the first chunk.
+
+        Args:
+            t: time [s].
+            observe: makes the observation of this moment; None where not everything has spoken yet.
+            live: whether time passes by itself, so that nobody may wait here.
+
+        Raises:
+            ServiceUnavailable: the server is not there, refuses, or takes longer than it may.
+            BadAction: what it answered is no action.
+        """
+        c = self._config
+        if self._job is not None:
+            job, asked = self._job
+            if live and not job.done():
+                if t - asked > c.timeout:
+                    raise ServiceUnavailable(f"The policy has not answered for {c.timeout:g} s.")
+            elif t >= asked + (0.0 if live else c.latency) - 1e-9:
+                self._job = None
+                self._chunk, self._begun = check_actions(job.result()), asked
+        index = math.floor((t - self._begun) * c.fps + 1e-6)
+        if self._job is None and (self._chunk is None or index >= min(c.use, len(self._chunk))):
+            seen = observe()
+            if seen is not None:
+                self._job = self._pool.submit(self._policy.infer, seen), t
+                if not live and c.latency == 0.0:
+                    return self.step(t, observe, live)
+        return None if self._chunk is None else self._chunk[min(max(index, 0), len(self._chunk) - 1)]
+
+    def close(self) -> None:
+        """Ask no more."""
+        self._pool.shutdown(wait=False, cancel_futures=True)
