@@ -36,8 +36,10 @@ LAYERS = (
     ("stack", "runtime", "provenance"),
     ("agent",),
     ("evaluation", "dashboard", "doctor", "option_list"),
-    ("datasets", "teleop", "training"),
-    ("run", "demo", "demo_walk", "agent_command", "cli", "__main__"),
+    ("datasets", "training"),
+    ("run", "demo", "demo_walk", "agent_command"),
+    ("teleop",),
+    ("cli", "__main__"),
 )
 LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}
 NOT_AT_RUN_TIME = "training"

@@ -270,6 +270,8 @@ def _command(doc: str, module: str, names: str, graphics: bool = False) -> Calla
 COMMANDS: dict[str, Callable[[list[str]], int]] = {
     "demo": _demo,
     "run": _run,
+    "teleop": _command("Drive a robot by hand in the browser: gizmos, keyboard, gamepad; record demonstrations.",
+                       "golem.teleop.session", "TeleopConfig:run_teleop", True),
     "options": _command("List what a stack file may set: slots, their implementations, the options of one.",
                         "golem.option_list", "OptionsConfig:run_options", True),
     "ladder": _ladder,

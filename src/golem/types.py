@@ -316,8 +316,11 @@ class PalmTargets:
     Attributes:
         t: time stamp [s].
         left, right: (4, 4) pose of that hand's grasp frame in odom; None leaves the arm where it is.
+        torso: angle that the waist is to have where the hands leave it free [rad], for controllers that can choose;
+            None is their own.
     """
 
     t: float
     left: Array | None = None
     right: Array | None = None
+    torso: float | None = None

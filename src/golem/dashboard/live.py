@@ -11,7 +11,7 @@ import contextlib
 import io
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import cv2
 import numpy as np
@@ -33,8 +33,12 @@ from golem.robots.mujoco.shoves import Pusher
 from golem.robots.mujoco.spectator import SpectatorView
 from golem.runtime.executor import FOREVER
 from golem.runtime.lockstep import LockstepRunner
-from golem.skills.base import SkillResult
+from golem.skills.base import Routine, SkillResult
+from golem.skills.context import Context
 from golem.types import TICK, Twist
+
+if TYPE_CHECKING:
+    import viser
 
 PERIOD = 0.05
 """Time between two updates of the picture [s]."""
@@ -144,7 +148,14 @@ class LiveView:
         """The panel with the operator's buttons."""
         return self._panel
 
-    def run(self, skill: str, goal: object, watch: Callable[[], None] = lambda: None) -> SkillResult:
+    @property
+    def shown(self) -> tuple[viser.ViserServer, SpectatorView]:
+        """The server, and what it shows: for who adds to the scene."""
+        return self._server, self._view
+
+    def run(
+        self, skill: str | Routine[Context, Any], goal: object, watch: Callable[[], None] = lambda: None
+    ) -> SkillResult:
         """Run a skill of the stack in real time while showing it; see `LockstepRunner.execute`."""
         self._timeline = Timeline.of(self._running)
         self._busy, self._wanted = True, None

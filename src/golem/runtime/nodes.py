@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from golem.capabilities.arms.base import UpperBody
+from golem.capabilities.arms.base import HasWaist, UpperBody
 from golem.capabilities.arms.trajectory import TrajectoryFollower
 from golem.hardware.estimator.base import BaseEstimator
 from golem.hardware.hands.base import HandController
@@ -166,6 +166,8 @@ class UpperBodyNode:
         self._limits = ArmLimits(contract, self.period)
         contract.times.allowed = self.period + self._latency
         self._stopped_at = 0.0
+        self._turn_waist = arms.turn_waist if isinstance(arms, HasWaist) else None
+        self._waist: float | None = None
         self._follower = TrajectoryFollower()
         self._followed: JointTrajectory | None = None
         self._command: Array | None = None
@@ -206,12 +208,16 @@ class UpperBodyNode:
             start = np.concatenate((state.q[: UPPER.start], self._follower.q))
             self._contract.call(self._arms.reset, start)
             self._limits.reset(start)
-        left = right = None
+        left = right = waist = None
         # A target from before a stop must not set the arms in motion when the robot is released.
         if targets is not None and targets.t > self._stopped_at:
             T = base.T_odom_base
             left = None if targets.left is None else seen_from(T, targets.left)
             right = None if targets.right is None else seen_from(T, targets.right)
+            waist = targets.torso
+        if waist != self._waist and self._turn_waist is not None:
+            self._waist = waist
+            self._contract.call(self._turn_waist, waist)
         command = self._contract.call(self._arms.step, left, right, state.q, self.period)
         self._contract.kind("the arm command", command, ArmCommand)
         self._contract.arrays(UPPER.stop - UPPER.start, q=command.q)

@@ -156,6 +156,7 @@ class Context:
         t: present time [s].
         legs: the lower body.
         arms, hands: by side.
+        torso: angle that the waist is to have with the next palm targets [rad]; None is the controller's own.
         skill: name of the running skill, for its feedback.
     """
 
@@ -167,6 +168,7 @@ class Context:
         self.period = period
         self.t = 0.0
         self.skill = ""
+        self.torso: float | None = None
         self._checks: list[Callable[[], None]] = []
         self.legs = LegsInterface(self)
         self.arms: dict[Side, Arm] = {"left": Arm(self, "left"), "right": Arm(self, "right")}
@@ -231,7 +233,7 @@ class Context:
     def send_palms(self) -> None:
         """Publish where both arms are being sent; an arm that was never moved keeps its posture."""
         left, right = (self.arms[side]._commanded for side in ("left", "right"))
-        self.publish(topics.PALM_TARGETS, PalmTargets(self.t, left, right))
+        self.publish(topics.PALM_TARGETS, PalmTargets(self.t, left, right, self.torso))
 
     async def follow(self, times: Array, q: Array, dq: Array | None = None) -> float:
         """Move torso and arms along a timed joint trajectory; they stay where it ends.
@@ -257,6 +259,7 @@ class Context:
     def release_arms(self) -> None:
         """Forget where the arms were sent: they keep their posture, and the next motion starts from where they are."""
         if self.arms["left"].sent or self.arms["right"].sent:
+            self.torso = None
             for arm in self.arms.values():
                 arm.forget()
             self.send_palms()

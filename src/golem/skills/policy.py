@@ -10,7 +10,7 @@ import numpy as np
 
 from golem.capabilities.policies.openpi import PolicyConfig, PolicyServer
 from golem.capabilities.policies.stream import ActionStream
-from golem.capabilities.policies.vectors import GRIPS, HEIGHT, SHUT, TWIST, BadAction, palm_pose
+from golem.capabilities.policies.vectors import GRIPS, HEIGHT, SHUT, TORSO, TWIST, BadAction, palm_pose
 from golem.errors import ServiceUnavailable
 from golem.options import require
 from golem.robots.model.magpie_model import MAX_GAP
@@ -88,6 +88,7 @@ class PolicySkill:
         goals = {side: T @ palm_pose(action[9 * k : 9 * k + 9]) for k, side in enumerate(SIDES)}
         for side, goal in goals.items():
             check_near(side, goal, context.arms[side].pose)
+        context.torso = float(action[TORSO])
         for k, side in enumerate(SIDES):
             context.arms[side].approach(goals[side], SPEED)
             gap = float(np.clip(action[GRIPS][k], 0.0, MAX_GAP))

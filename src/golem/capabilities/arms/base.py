@@ -75,6 +75,15 @@ class UpperBody(Protocol):
         ...
 
 
+@runtime_checkable
+class HasWaist(Protocol):
+    """An upper-body controller whose waist can be turned at will."""
+
+    def turn_waist(self, angle: float | None) -> None:
+        """Prefer `angle` [rad] for the waist where the hands leave it free; None is the controller's own."""
+        ...
+
+
 def check_pose(name: str, pose: Array) -> Array:
     """Return `pose` as a (4, 4) float64 array if it is a rigid transform.
 

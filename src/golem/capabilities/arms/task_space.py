@@ -209,6 +209,12 @@ class TaskSpaceController(ABC):
         # Not into the range of the waist: a robot that was turned further while it was limp would swing back at once.
         self._move(np.clip(check_joints("The posture to start from", q)[UPPER], *self._kinematics.stops))
 
+    def turn_waist(self, angle: float | None) -> None:
+        """Prefer `angle` [rad] for the waist; see `HasWaist`."""
+        self.rest[0] = np.clip(
+            posture(self.config.posture)[0] if angle is None else angle, self.lower[0], self.upper[0]
+        )
+
     def step(self, targets_left: Array | None, targets_right: Array | None, q_measured: Array, dt: float) -> ArmCommand:
         """Solve once and integrate; see `UpperBody.step`."""
         task = self.task
