@@ -31,20 +31,16 @@ class Gizmos:
         for side in SIDES:
             gizmo = server.scene.add_transform_controls(f"{WORLD}/{side}_goal", scale=0.15, visible=False)
             label = server.scene.add_label(f"{WORLD}/{side}_refused", "", visible=False)
-            gizmo.on_drag_start(lambda event, side=side: self._drag(event, side, True))
             gizmo.on_update(lambda event, side=side: self._drag(event, side))
-            gizmo.on_drag_end(lambda event, side=side: self._drag(event, side, False))
             self._gizmos[side], self._labels[side] = gizmo, label
         server.on_client_disconnect(lambda client: self._gone(str(client.client_id)))
 
-    def _drag(self, event: Any, side: Side, held: bool | None = None) -> None:
+    def _drag(self, event: Any, side: Side) -> None:
         """Take a movement of the mouse, in a thread of the server."""
-        if held is False:
+        if event.phase == "end":
             self._held.discard(side)
-        elif held:
+        else:
             self._held.add(side)
-        if held is None and side not in self._held:
-            return
         goal = None
         if side in self._held:
             goal, gizmo = np.eye(4), self._gizmos[side]

@@ -1,0 +1,5 @@
+from __future__ import annotations
+
+from tests.dashboard.conftest import standing, twin, walker
+
+__all__ = ["standing", "twin", "walker"]
