@@ -39,6 +39,8 @@ BASE = np.array([0.3, 0.2, 0.4])
 """What 1 is for the base [m/s], [rad/s]."""
 DROP = 0.15
 """What -1 is for its height [m]."""
+QUICK = 5.0
+"""Acceleration of a palm target [m/s^2]."""
 LEAD = 0.05
 """How far a palm target may run ahead of the hand [m]."""
 _BOUND = {"q": 7.0, "dq": 60.0, "palms": 5.0, "gaps": 0.2, "forces": 100.0, "base": 10.0}
@@ -278,7 +280,7 @@ class Mover:
                 goal[:3, :3] = pin.exp3(dt * TURN * (R @ twist[3:])) @ goal[:3, :3]
                 u, _, v = np.linalg.svd(goal[:3, :3])
                 goal[:3, :3] = u @ v
-                arm.approach(goal.copy(), SPEED)
+                arm.approach(goal.copy(), SPEED, QUICK)
             gap = float(0.5 * (action[12 + k] + 1.0) * MAX_GAP)
             last, shut = self._gaps[k], gap < 0.05 * MAX_GAP
             if last is None or abs(gap - last) > 0.02 * MAX_GAP or shut != (last < 0.05 * MAX_GAP):

@@ -10,6 +10,7 @@ import ctypes
 import importlib
 import os
 import sys
+import threading
 from typing import Protocol
 
 from golem.errors import MissingSystemLibrary, unknown_name
@@ -33,7 +34,11 @@ class GlContext(Protocol):
         ...
 
 
-_shared: GlContext | None = None
+class _OfThread(threading.local):
+    context: GlContext | None = None
+
+
+_shared = _OfThread()
 
 
 def choose_backend() -> str:
@@ -60,22 +65,21 @@ def choose_backend() -> str:
 
 
 def shared_context() -> GlContext:
-    """Return the one OpenGL context of this process, made current in the calling thread.
+    """Return the one OpenGL context of the calling thread, made current in it: a context serves one thread at a time.
 
     Raises:
         ConfigError: as in `choose_backend`.
         MissingSystemLibrary: the backend's library or its driver is absent.
     """
-    global _shared
-    if _shared is None:
+    if _shared.context is None:
         backend = choose_backend()
         try:
-            _shared = importlib.import_module(f"mujoco.{backend}").GLContext(1, 1)
+            _shared.context = importlib.import_module(f"mujoco.{backend}").GLContext(1, 1)
         except Exception as error:  # PyOpenGL reports absent libraries as AttributeError, ImportError or GLError
             raise _missing(backend, f"no context ({type(error).__name__})") from error
-    assert _shared is not None
-    _shared.make_current()
-    return _shared
+    assert _shared.context is not None
+    _shared.context.make_current()
+    return _shared.context
 
 
 def _missing(backend: str, reason: str) -> MissingSystemLibrary:
