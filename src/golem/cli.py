@@ -136,7 +136,7 @@ BENCHES = {
 
 
 def _train(words: list[str]) -> int:
-    """Train a module from scratch: detector, grasps or legs."""
+    """Train a module from scratch: act, detector, grasps or legs."""
     what = _named(words, "train", "thing to train", TRAINERS)
     if what is None:
         return 0
@@ -152,6 +152,7 @@ def _train(words: list[str]) -> int:
 
 
 TRAINERS = {
+    "act": "golem.training.act.__main__",
     "detector": "golem.training.detector.__main__",
     "grasps": "golem.training.grasps.__main__",
     "legs": "golem.training.legs.__main__",

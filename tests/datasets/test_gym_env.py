@@ -8,10 +8,10 @@ import pytest
 
 gym = pytest.importorskip("gymnasium")
 
-from golem.datasets.gym_env import ACTIONS, RUNGS, GolemEnv
-from golem.errors import ConfigError, GolemError
-from golem.evaluation.base import TrialSpec, rung_class
-from golem.evaluation.episodes.oracle import Oracle
+from golem.datasets.gym_env import ACTIONS, RUNGS, GolemEnv  # noqa: E402
+from golem.errors import ConfigError, GolemError  # noqa: E402
+from golem.evaluation.base import TrialSpec, rung_class  # noqa: E402
+from golem.evaluation.episodes.oracle import Oracle  # noqa: E402
 
 SHORT: dict[str, Any] = {"limit": 0.3, "period": 0.05}
 
@@ -126,5 +126,3 @@ def test_the_judge_of_the_rung_says_when_it_is_done(monkeypatch: pytest.MonkeyPa
             break
     env.close()
     assert (reward, terminated, truncated, info["success"]) == (1.0, True, False, True)
-
-

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from golem.capabilities.policies.openpi import PolicyConfig, PolicyServer
-from golem.capabilities.policies.stream import ActionStream
+from golem.capabilities.policies.openpi import PolicyConfig
+from golem.capabilities.policies.stream import ActionStream, open_policy
 from golem.capabilities.policies.vectors import GRIPS, HEIGHT, SHUT, TORSO, TWIST, BadAction, palm_pose
 from golem.errors import ServiceUnavailable
 from golem.options import require
@@ -57,12 +57,12 @@ class PolicySkill:
 
     async def run(self, context: Context, goal: PolicyGoal) -> SkillResult:
         """Do what the policy says, as far as arms, legs and gate let it; see `Skill`."""
-        c, live = self._config, context.modules.worker is not None
-        server = PolicyServer(c)
-        context.say("policy", f"The policy at {c.host}:{c.port} moves the robot.")
+        live = context.modules.worker is not None
+        policy, c = open_policy(self._config)
+        context.say("policy", f"The policy {c.file or f'at {c.host}:{c.port}'} moves the robot.")
         with (
-            closing(server),
-            closing(ActionStream(server, c)) as stream,
+            closing(policy),
+            closing(ActionStream(policy, c)) as stream,
             PolicyView(context, c.cameras, c.width, goal.prompt) as view,
         ):
             end = context.t + goal.seconds

@@ -14,8 +14,8 @@ import numpy as np
 
 from golem.capabilities.grasping.base import Grasp, ServoLaw, ServoStatus, ServoStep
 from golem.capabilities.grasping.centroid import Centroid
-from golem.capabilities.policies.openpi import PolicyConfig, PolicyServer
-from golem.capabilities.policies.stream import ActionStream, Policy
+from golem.capabilities.policies.openpi import PolicyConfig
+from golem.capabilities.policies.stream import ActionStream, Policy, open_policy
 from golem.capabilities.policies.vectors import GRIPS, BadAction, palm_pose
 from golem.types import SIDES, Array, LocalizedObject, Side
 
@@ -90,12 +90,12 @@ class PolicyGrasp(Centroid):
         """Take the options; the server is asked when the hand is above the object.
 
         Raises:
+            ConfigError: its file is no policy.
             MissingExtra: the extra `policy` is not installed.
         """
         super().__init__()
-        self.options = config or PolicyGraspConfig()
-        self._server = PolicyServer(self.options)
+        self._policy, self.options = open_policy(config or PolicyGraspConfig())
 
     def servo(self, target: LocalizedObject, grasp: Grasp, t: float) -> ServoLaw | None:
         """Return the law; see `GraspMethod`."""
-        return PolicyLaw(self._server, self.options, target, grasp.gap)
+        return PolicyLaw(self._policy, self.options, target, grasp.gap)

@@ -32,6 +32,7 @@ class PolicyConfig:
         cameras: whose pictures it is sent.
         width: of the pictures [px]; 0 is as the camera has it.
         api_key: of the server, if it asks for one.
+        file: of a policy that `golem train act` wrote, which needs no server; it says its own camera and rate.
     """
 
     host: str = "127.0.0.1"
@@ -43,6 +44,7 @@ class PolicyConfig:
     cameras: tuple[str, ...] = ("right_hand",)
     width: int = 0
     api_key: str = ""
+    file: str = ""
 
     def __post_init__(self) -> None:
         require(

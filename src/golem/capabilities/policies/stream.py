@@ -5,9 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import Any, Protocol
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Protocol, TypeVar
 
-from golem.capabilities.policies.openpi import PolicyConfig
+from golem.capabilities.policies.onnx_policy import OnnxPolicy
+from golem.capabilities.policies.openpi import PolicyConfig, PolicyServer
 from golem.capabilities.policies.vectors import check_actions
 from golem.errors import ServiceUnavailable
 from golem.types import Array
@@ -23,6 +26,22 @@ class Policy(Protocol):
             ServiceUnavailable: there is no answer.
         """
         ...
+
+
+C = TypeVar("C", bound=PolicyConfig)
+
+
+def open_policy(config: C) -> tuple[PolicyServer | OnnxPolicy, C]:
+    """Return the policy that `config` names, and the options with what its file says.
+
+    Raises:
+        ConfigError: the file is none.
+        MissingExtra: the extra `policy` is not installed.
+    """
+    if not config.file:
+        return PolicyServer(config), config
+    policy = OnnxPolicy(Path(config.file))
+    return policy, replace(config, cameras=(policy.camera,), fps=policy.fps)
 
 
 class ActionStream:
