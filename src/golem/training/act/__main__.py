@@ -96,7 +96,7 @@ def train_act(
         for group in optimiser.param_groups:
             group["lr"] = rate * min(1.0, step / 100, 3.0 * (1.0 - step / (steps + 1)))
         optimiser.step()
-        total += float(loss)
+        total += loss.item()
         if step % 200 == 0 or step == steps:
             error = 1e3 * _palm_error(net, held)
             took = time.monotonic() - begun

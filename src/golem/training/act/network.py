@@ -1,6 +1,6 @@
-"""The network: ACT of Zhao et al. 2023, "Learning Fine-Grained Bimanual Manipulation with Low-Cost Hardware", made small.
+"""The network: ACT (Zhao et al. 2023, "Learning Fine-Grained Bimanual Manipulation with Low-Cost Hardware"), but small.
 
-A transformer encoder reads a latent, the state, and a picture as tokens of a small convolutional network; a decoder with
+A transformer encoder reads a latent, the state, and a picture as tokens of a convolutional network; a decoder with
 a query per future action gives the chunk. In training the latent is drawn from what an encoder of the true actions says
 (a conditional VAE, their eq. 1-2); in use it is zero, the mean of its prior.
 """
