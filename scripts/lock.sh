@@ -24,6 +24,9 @@ compile pyproject.toml --constraints "$together" --extra hardware --output-file 
 compile pyproject.toml --constraints "$together" --extra realsense --output-file requirements/realsense.txt "$@"
 compile pyproject.toml --constraints "$together" --extra graspgen --output-file requirements/graspgen.txt "$@"
 compile pyproject.toml --constraints "$together" --extra agent --output-file requirements/agent.txt "$@"
+compile pyproject.toml --constraints "$together" --extra data --output-file requirements/data.txt "$@"
+compile pyproject.toml --constraints "$together" --extra gym --output-file requirements/gym.txt "$@"
+compile pyproject.toml --constraints "$together" --extra policy --output-file requirements/policy.txt "$@"
 compile pyproject.toml --constraints "$together" --extra cluster --output-file requirements/cluster.txt "$@"
 compile pyproject.toml --constraints "$together" --extra view --output-file requirements/view.txt "$@"
 compile pyproject.toml --constraints "$together" --extra lidar --output-file requirements/lidar.txt "$@"
@@ -33,6 +36,7 @@ compile pyproject.toml --constraints "$together" --extra vision --output-file re
 compile pyproject.toml --constraints "$together" --extra docs --output-file requirements/docs.txt "$@"
 compile pyproject.toml --constraints "$together" --extra dev --extra pink --extra dds --extra record --extra foxglove \
     --extra report --extra view --extra agent --extra cluster --extra graspgen --extra lidar --extra hardware --extra realsense --extra physx \
+    --extra data --extra gym --extra policy \
     --output-file requirements/dev.txt "$@"
 echo "uv>=0.13,<0.14" | compile - --output-file requirements/uv.txt "$@"
 # Isaac Lab runs apart, under Python 3.12 on Linux: its lock need not fit the others.

@@ -23,6 +23,9 @@ probe() {
         hardware) echo "from golem.hardware.drivers.serial_port import SerialPort; SerialPort('/dev/none', 9600)" ;;
         realsense) echo "from golem.hardware.drivers.realsense_camera import library; library()" ;;
         vision) echo "from pathlib import Path; from golem.capabilities.perception.open_words import load_model; load_model(Path('none'), 'clip', 'CLIPModel', 'CLIPProcessor')" ;;
+        data) echo "from golem.datasets.writer import DatasetWriter; from golem.datasets.schema import Recipe; from pathlib import Path; DatasetWriter(Path('none'), Recipe()).close()" ;;
+        gym) echo "import golem.datasets.gym_env" ;;
+        policy) echo "from golem.registry import create; create('grasp_method', 'policy', {})" ;;
         graspgen) echo "from golem.registry import create; create('grasp_method', 'graspgen', {})" ;;
         cluster) echo "from golem.evaluation.harness.trial_executor import DaskExecutor; DaskExecutor('no scheduler')" ;;
         lidar) echo "from golem.registry import create; create('odometry', 'kiss_icp', {}); create('odometry', 'rko_lio', {})" ;;
@@ -63,7 +66,7 @@ trap 'rm -rf "$empty"' EXIT
 python=$(.venv/bin/python -c 'import sys; print(sys._base_executable)')
 environment "$empty/core" core
 failed=0
-for extra in "${@:-pink dds train record foxglove report hardware realsense vision graspgen cluster view lidar physx}"; do
+for extra in "${@:-pink dds train record foxglove report hardware realsense vision graspgen data gym policy cluster view lidar physx}"; do
     for one in $extra; do
         lock=$one
         [ "$one" = foxglove ] && lock=record

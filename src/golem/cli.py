@@ -160,20 +160,24 @@ TRAINERS = {
 """What can be trained, and the module that does it."""
 
 
+def _record(words: list[str]) -> int:
+    """Record a domain into a bag that ROS 2 tools and Foxglove read; --lerobot DATASET: into a data set."""
+    if words[:1] == ["--lerobot"]:
+        return _one_of(["--lerobot", *words[1:]], "record", "way to record", {"--lerobot": DATASETS["live"]})
+    from golem.runtime.live.record_commands import RecordConfig, run_record
+
+    return _exit_code(run_record(_parse(RecordConfig, "record", words)))
+
+
 def _dataset(words: list[str]) -> int:
-    """Data sets in LeRobot's format: `dataset record`, export, import, check, delete, split, merge."""
+    """Data sets in LeRobot's format: `dataset record`, live, export, import, check, delete, split, merge."""
     _prepare_graphics()
     return _one_of(words, "dataset", "thing to do with a data set", DATASETS)
 
 
 DATASETS = {
-    "record": ("golem.datasets.commands", "DemonstrateConfig", "run_demonstrate"),
-    "export": ("golem.datasets.commands", "ExportConfig", "run_export"),
-    "import": ("golem.datasets.commands", "ImportConfig", "run_import"),
-    "check": ("golem.datasets.commands", "CheckDatasetConfig", "run_check_dataset"),
-    "delete": ("golem.datasets.commands", "DeleteConfig", "run_delete"),
-    "split": ("golem.datasets.commands", "SplitConfig", "run_split"),
-    "merge": ("golem.datasets.commands", "MergeConfig", "run_merge"),
+    name: ("golem.datasets.commands", f"{name.title()}Config", f"run_{name}")
+    for name in ("record", "live", "export", "import", "check", "delete", "split", "merge")
 }
 """What is done with a data set."""
 
@@ -315,8 +319,7 @@ COMMANDS: dict[str, Callable[[list[str]], int]] = {
                     "golem.agent_command", "McpConfig:run_mcp", True),
     "topics": _command("List what is on a domain, with rates and bytes.",
                        "golem.runtime.live.topic_stats", "TopicStatsConfig:run_topic_stats"),
-    "record": _command("Record a domain into a bag that ROS 2 tools and Foxglove read.",
-                       "golem.runtime.live.record_commands", "RecordConfig:run_record"),
+    "record": _record,
     "replay": _command("Play a bag onto a domain.", "golem.runtime.live.record_commands", "ReplayBagConfig:run_replay"),
     "black-box": _command("Show a stop of the safety gate at the moment of the fault.",
                           "golem.dashboard.stop_view", "StopViewConfig:run_stop_view"),

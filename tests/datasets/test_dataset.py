@@ -15,11 +15,11 @@ from golem.datasets import swap
 from golem.datasets import writer as writing
 from golem.datasets.check import check
 from golem.datasets.commands import (
-    CheckDatasetConfig,
+    CheckConfig,
     DeleteConfig,
     MergeConfig,
     SplitConfig,
-    run_check_dataset,
+    run_check,
     run_delete,
     run_merge,
     run_split,
@@ -67,7 +67,7 @@ def test_statistics_are_those_of_all_frames(dataset: Path) -> None:
 
 
 def test_a_sound_data_set_has_no_findings(dataset: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run_check_dataset(CheckDatasetConfig(dataset))
+    assert run_check(CheckConfig(dataset))
     assert "3 episodes, 95 frames at 15 fps: no findings." in capsys.readouterr().out
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,6 +15,7 @@ from tyro.conf import OmitArgPrefixes, Positional, arg
 from golem.datasets.sampling import MessageRecorder, StackRecorder, recipe, write_bag
 from golem.datasets.schema import Recipe
 from golem.errors import ConfigError, OutputError
+from golem.middleware.dds.domain import DdsConfig
 
 if TYPE_CHECKING:
     from golem.evaluation.base import TrialSpec
@@ -40,7 +42,7 @@ class PictureOptions:
 
 
 @dataclass(frozen=True)
-class DemonstrateConfig:
+class RecordConfig:
     """Record trials of a rung as demonstrations: an episode per success. A data set that is there goes on."""
 
     dataset: Positional[Path]
@@ -82,6 +84,20 @@ class ExportConfig:
 
 
 @dataclass(frozen=True)
+class LiveConfig:
+    """Record a domain as one episode of a data set, until Ctrl-C; what is not finished is not in it."""
+
+    dataset: Positional[Path]
+    """Folder of the data set; one that is there goes on."""
+    seconds: float = math.inf
+    """Time to record."""
+    task: str = "Take a loose screw and drop it in the tray."
+    """What is done, as a sentence."""
+    pictures: OmitArgPrefixes[PictureOptions] = field(default_factory=PictureOptions)
+    dds: OmitArgPrefixes[DdsConfig] = field(default_factory=DdsConfig)
+
+
+@dataclass(frozen=True)
 class ImportConfig:
     """Write an episode of a data set of this robot as a bag, which `robot: {use: replay}` and ROS 2 tools read."""
 
@@ -94,7 +110,7 @@ class ImportConfig:
 
 
 @dataclass(frozen=True)
-class CheckDatasetConfig:
+class CheckConfig:
     """Check a data set: frame times, gaps, ranges, stuck sensors, and its videos against its table."""
 
     dataset: Positional[Path]
@@ -137,7 +153,7 @@ class MergeConfig:
     """Folders of the data sets."""
 
 
-def run_demonstrate(config: DemonstrateConfig) -> int:
+def run_record(config: RecordConfig) -> int:
     """Record; return how many episodes were added.
 
     Raises:
@@ -218,6 +234,38 @@ def _specs(config: ExportConfig) -> list[TrialSpec]:
     return [r.spec for k, r in records.items() if (k in config.trials if config.trials else r.success)]
 
 
+def run_live(config: LiveConfig) -> int:
+    """Record; return the frames of the episode.
+
+    Raises:
+        DatasetError, OutputError, MissingExtra: see `DatasetWriter`; also if nothing was on the domain.
+        DdsError: the domain cannot be joined.
+    """
+    from golem.datasets.writer import DatasetWriter
+    from golem.interfaces.recorded import public_topics
+    from golem.middleware.bags.recorder import Recorder
+    from golem.middleware.dds.connect import connect
+    from golem.middleware.interrupt import interrupted
+    from golem.runtime.live.exclusive_writers import identity
+
+    what = config.pictures.recipe()
+    with (
+        closing(connect(config.dds, identity("record"))) as participant,
+        interrupted() as stop,
+        closing(DatasetWriter(config.dataset, what, f"domain {config.dds}")) as writer,
+    ):
+        sink = MessageRecorder(writer, what, config.task)
+        with closing(Recorder(participant, sink)) as recorder:
+            recorder.add(public_topics(sink.topics))
+            print(f"Recording {config.dds} to {config.dataset}. Ctrl-C ends it.", flush=True)
+            recorder.run(stop, lambda: None, config.seconds)
+        frames = writer.length
+        print(f"{frames} frames are episode {writer.finish()} of {config.dataset}.", flush=True)
+    for name in sorted(recorder.overruns):
+        print(f"{name}: more than could be kept; some were lost.")
+    return frames
+
+
 def run_import(config: ImportConfig) -> int:
     """Write the bag; return its messages.
 
@@ -242,7 +290,7 @@ def run_import(config: ImportConfig) -> int:
     return written
 
 
-def run_check_dataset(config: CheckDatasetConfig) -> bool:
+def run_check(config: CheckConfig) -> bool:
     """Print what is wrong; return whether nothing is.
 
     Raises:

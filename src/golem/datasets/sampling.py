@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
@@ -47,6 +48,10 @@ def recipe(fps: int, cameras: tuple[str, ...], width: int, depth: bool, masks: t
         wide = (width or info.width) // 2 * 2
         chosen[name] = replace(info, width=wide, height=round(info.height * wide / info.width) // 2 * 2)
     return Recipe(fps, chosen, depth and bool(chosen), masks if chosen else ())
+
+
+SLACK = NANO // 1000
+"""Half a tick [ns]."""
 
 
 class Sampler:
@@ -143,7 +148,10 @@ class StackRecorder:
 
 
 class MessageRecorder:
-    """Records public messages, of a bag or a domain, as one episode; a `Sink`."""
+    """Records public messages, of a bag or a domain, as one episode; a `Sink`.
+
+    A frame is what was there at the end of a tick whose time is a multiple of the period, as in lock-step.
+    """
 
     def __init__(self, writer: DatasetWriter, what: Recipe, task: str) -> None:
         """Begin an episode of `writer` in which `task` is done."""
@@ -167,7 +175,7 @@ class MessageRecorder:
 
     def write(self, message: BagMessage) -> None:
         """Take one message; see `Sink`."""
-        while self._next is not None and message.log_time >= self._next:
+        while self._next is not None and message.log_time > self._next + SLACK:
             frame = self._sampler.frame()
             if frame is not None:
                 self._writer.add(frame)
@@ -176,7 +184,7 @@ class MessageRecorder:
         if take is not None:
             take(message)
             if self._next is None and self._sampler.frame() is not None:
-                self._next = float(message.log_time)
+                self._next = self._period * math.ceil((message.log_time - SLACK) / self._period)
 
     def close(self) -> None:
         """Do nothing: whoever has the writer finishes the episode."""
