@@ -23,7 +23,7 @@ probe() {
         hardware) echo "from golem.hardware.drivers.serial_port import SerialPort; SerialPort('/dev/none', 9600)" ;;
         realsense) echo "from golem.hardware.drivers.realsense_camera import library; library()" ;;
         vision) echo "from pathlib import Path; from golem.capabilities.perception.open_words import load_model; load_model(Path('none'), 'clip', 'CLIPModel', 'CLIPProcessor')" ;;
-        data) echo "from golem.datasets.writer import DatasetWriter; from golem.datasets.schema import Recipe; from pathlib import Path; DatasetWriter(Path('none'), Recipe()).close()" ;;
+        data) echo "from golem.datasets.episode_writer import DatasetWriter; from golem.datasets.schema import Recipe; from pathlib import Path; DatasetWriter(Path('none'), Recipe()).close()" ;;
         gym) echo "import golem.datasets.gym_env" ;;
         policy) echo "from golem.registry import create; create('grasp_method', 'policy', {})" ;;
         graspgen) echo "from golem.registry import create; create('grasp_method', 'graspgen', {})" ;;

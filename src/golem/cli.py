@@ -176,7 +176,7 @@ def _dataset(words: list[str]) -> int:
 
 
 DATASETS = {
-    name: ("golem.datasets.commands", f"{name.title()}Config", f"run_{name}")
+    name: ("golem.datasets.commands", f"{name.title()}DatasetConfig", f"run_{name}")
     for name in ("record", "live", "export", "import", "check", "delete", "split", "merge")
 }
 """What is done with a data set."""

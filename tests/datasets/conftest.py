@@ -12,8 +12,8 @@ import pytest
 pytest.importorskip("pyarrow")
 pytest.importorskip("av")
 
+from golem.datasets.episode_writer import DatasetWriter  # noqa: E402
 from golem.datasets.schema import Recipe  # noqa: E402
-from golem.datasets.writer import DatasetWriter  # noqa: E402
 from golem.robots.sensors.cameras import CAMERAS  # noqa: E402
 
 SMALL = Recipe(15, {"right_hand": replace(CAMERAS["right_hand"], width=64, height=48)}, depth=True, masks=("screw",))

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from tests.datasets.conftest import PLAIN, SMALL, frames
 
-from golem.datasets.writer import DatasetWriter
+from golem.datasets.episode_writer import DatasetWriter
 
 recipe = SMALL if sys.argv[2] == "pictures" else PLAIN
 writer = DatasetWriter(Path(sys.argv[1]), recipe)

@@ -11,39 +11,39 @@ import pytest
 from tests.datasets.conftest import PLAIN, SMALL, frames, write
 
 from golem.capabilities.policies.vectors import STATE
+from golem.datasets import episode_writer as writing
 from golem.datasets import swap
-from golem.datasets import writer as writing
-from golem.datasets.check import check
 from golem.datasets.commands import (
-    CheckConfig,
-    DeleteConfig,
-    MergeConfig,
-    SplitConfig,
+    CheckDatasetConfig,
+    DeleteDatasetConfig,
+    MergeDatasetConfig,
+    SplitDatasetConfig,
     run_check,
     run_delete,
     run_merge,
     run_split,
 )
+from golem.datasets.episode_writer import DatasetWriter
+from golem.datasets.findings import check
 from golem.datasets.schema import DatasetError, Recipe
-from golem.datasets.store import Dataset
-from golem.datasets.writer import DatasetWriter
+from golem.datasets.store import DatasetFolder
 from golem.errors import GolemError, OutputError
 
 pq = pytest.importorskip("pyarrow.parquet")
 
 
 def told(root: Path) -> list[str]:
-    return [str(finding) for finding in check(Dataset(root))]
+    return [str(finding) for finding in check(DatasetFolder(root))]
 
 
-def same_actions(data: Dataset, index: int, seed: int, recipe: Recipe = SMALL) -> bool:
+def same_actions(data: DatasetFolder, index: int, seed: int, recipe: Recipe = SMALL) -> bool:
     episode = data.episode(index)
     wanted = [frame["action"] for frame in frames(episode.length, seed, recipe)]
     return np.array_equal(data.values(episode, "action"), np.array(wanted, np.float32))
 
 
 def test_what_was_written_is_read(dataset: Path) -> None:
-    data = Dataset(dataset)
+    data = DatasetFolder(dataset)
     assert [e.length for e in data.episodes] == [20, 70, 5] and data.tasks == ["Take a screw."]
     assert all(same_actions(data, k, k) for k in range(3))
     rows = frames(70, 1)
@@ -58,7 +58,7 @@ def test_what_was_written_is_read(dataset: Path) -> None:
 
 
 def test_statistics_are_those_of_all_frames(dataset: Path) -> None:
-    data = Dataset(dataset)
+    data = DatasetFolder(dataset)
     stats = json.loads((dataset / "meta/stats.json").read_text())
     every = np.concatenate([data.values(e, "action") for e in data.episodes])
     for name, value in {"mean": every.mean(0), "std": every.std(0), "min": every.min(0), "max": every.max(0)}.items():
@@ -67,13 +67,13 @@ def test_statistics_are_those_of_all_frames(dataset: Path) -> None:
 
 
 def test_a_sound_data_set_has_no_findings(dataset: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run_check(CheckConfig(dataset))
+    assert run_check(CheckDatasetConfig(dataset))
     assert "3 episodes, 95 frames at 15 fps: no findings." in capsys.readouterr().out
 
 
 def test_a_data_set_goes_on(dataset: Path) -> None:
     write(dataset, (7,))
-    assert [e.length for e in Dataset(dataset).episodes] == [20, 70, 5, 7] and told(dataset) == []
+    assert [e.length for e in DatasetFolder(dataset).episodes] == [20, 70, 5, 7] and told(dataset) == []
 
 
 def test_one_that_was_recorded_otherwise_does_not(dataset: Path) -> None:
@@ -102,7 +102,7 @@ def test_an_episode_that_is_not_finished_leaves_nothing(dataset: Path) -> None:
             writer.finish()
         finally:
             writer.close()
-    assert len(Dataset(dataset).episodes) == 3
+    assert len(DatasetFolder(dataset).episodes) == 3
 
 
 @pytest.mark.parametrize("wrong", ["nan", "shape", "missing"])
@@ -123,29 +123,29 @@ def test_a_frame_without_sense_is_refused(tmp_path: Path, wrong: str) -> None:
 
 
 def test_delete(dataset: Path) -> None:
-    run_delete(DeleteConfig(dataset, (1,)))
-    data = Dataset(dataset)
+    run_delete(DeleteDatasetConfig(dataset, (1,)))
+    data = DatasetFolder(dataset)
     assert [e.length for e in data.episodes] == [20, 5] and same_actions(data, 1, 2)
     assert told(dataset) == []
     with pytest.raises(DatasetError, match="episodes 0 to 1, no 7"):
-        run_delete(DeleteConfig(dataset, (7,)))
+        run_delete(DeleteDatasetConfig(dataset, (7,)))
     with pytest.raises(DatasetError, match="without episodes"):
-        run_delete(DeleteConfig(dataset, (0, 1)))
+        run_delete(DeleteDatasetConfig(dataset, (0, 1)))
     assert told(dataset) == []
 
 
 def test_split_and_merge(dataset: Path, tmp_path: Path) -> None:
-    run_split(SplitConfig(dataset, tmp_path / "a", tmp_path / "b", share=0.67))
-    assert [len(Dataset(tmp_path / name).episodes) for name in "ab"] == [2, 1]
+    run_split(SplitDatasetConfig(dataset, tmp_path / "a", tmp_path / "b", share=0.67))
+    assert [len(DatasetFolder(tmp_path / name).episodes) for name in "ab"] == [2, 1]
     other = write(tmp_path / "other", (4,), task="Drop it.")
-    run_merge(MergeConfig(tmp_path / "all", (tmp_path / "a", other, tmp_path / "b")))
-    data = Dataset(tmp_path / "all")
+    run_merge(MergeDatasetConfig(tmp_path / "all", (tmp_path / "a", other, tmp_path / "b")))
+    data = DatasetFolder(tmp_path / "all")
     assert sum(e.length for e in data.episodes) == 99 and data.tasks == ["Take a screw.", "Drop it."]
     assert told(tmp_path / "all") == told(tmp_path / "a") == []
     with pytest.raises(GolemError, match="other features"):
-        run_merge(MergeConfig(tmp_path / "x", (dataset, write(tmp_path / "plain", (3,), PLAIN))))
+        run_merge(MergeDatasetConfig(tmp_path / "x", (dataset, write(tmp_path / "plain", (3,), PLAIN))))
     with pytest.raises(OutputError, match="exists already"):
-        run_merge(MergeConfig(tmp_path / "all", (dataset,)))
+        run_merge(MergeDatasetConfig(tmp_path / "all", (dataset,)))
 
 
 def full(*_: Any, **__: Any) -> None:
@@ -168,7 +168,7 @@ def test_a_full_disk_costs_the_episode_and_no_other(dataset: Path, where: str, m
             writer.add(frame)
         writer.finish()
     monkeypatch.undo()
-    assert len(Dataset(dataset).episodes) == 3 and told(dataset) == []
+    assert len(DatasetFolder(dataset).episodes) == 3 and told(dataset) == []
     writer.begin("again")
     writer.add(frames(1)[0])
     assert writer.finish() == 3
@@ -182,43 +182,43 @@ def test_a_file_system_that_exchanges_nothing(dataset: Path, monkeypatch: pytest
 
     monkeypatch.setattr(swap.ctypes, "CDLL", Old)
     write(dataset, (7,))
-    assert len(Dataset(dataset).episodes) == 4
+    assert len(DatasetFolder(dataset).episodes) == 4
     # Killed between its two steps.
     os.rename(dataset, swap.beside(dataset, "old"))
     with swap.held(dataset):
         pass
-    assert len(Dataset(dataset).episodes) == 4
+    assert len(DatasetFolder(dataset).episodes) == 4
 
 
 def test_other_data_sets_are_told_apart(dataset: Path, tmp_path: Path) -> None:
     path = dataset / "meta/info.json"
     info = json.loads(path.read_text())
     with pytest.raises(DatasetError, match="no data set"):
-        Dataset(tmp_path / "nothing")
+        DatasetFolder(tmp_path / "nothing")
     path.write_text(json.dumps(info | {"codebase_version": "v2.1"}))
     with pytest.raises(DatasetError, match=r"version v2.1, not v3.0.*converts"):
-        Dataset(dataset)
+        DatasetFolder(dataset)
     path.write_text(json.dumps(info | {"total_frames": 1}))
     with pytest.raises(DatasetError, match="ended halfway"):
-        Dataset(dataset)
+        DatasetFolder(dataset)
     path.write_text("{")
     with pytest.raises(DatasetError, match="cannot be read"):
-        Dataset(dataset)
+        DatasetFolder(dataset)
     path.write_text(json.dumps({k: v for k, v in info.items() if k != "features"}))
     with pytest.raises(DatasetError, match="damaged"):
-        Dataset(dataset)
+        DatasetFolder(dataset)
     path.write_text(json.dumps(info))
     with pytest.raises(DatasetError, match="of another robot"):
-        Dataset(dataset).require("observation.state", like={"observation.state": ["main_shoulder_pan"]})
+        DatasetFolder(dataset).require("observation.state", like={"observation.state": ["main_shoulder_pan"]})
     with pytest.raises(DatasetError, match="has no observation.images.head"):
-        Dataset(dataset).require("observation.images.head")
+        DatasetFolder(dataset).require("observation.images.head")
 
 
 def test_a_data_set_without_frames(dataset: Path) -> None:
     for file in (dataset / "meta/episodes").rglob("*.parquet"):
         pq.write_table(pq.read_table(file).slice(0, 0), file)
     with pytest.raises(DatasetError, match="no frames"):
-        Dataset(dataset)
+        DatasetFolder(dataset)
 
 
 def test_missing_and_short_videos_are_found(dataset: Path) -> None:
@@ -228,7 +228,7 @@ def test_missing_and_short_videos_are_found(dataset: Path) -> None:
     found = told(dataset)
     assert len(found) == 2 and "cannot be read" in found[0] and "ends after 5 of the 70" in found[1]
     with pytest.raises(DatasetError, match="missing"):
-        run_delete(DeleteConfig(dataset, (2,)))
+        run_delete(DeleteDatasetConfig(dataset, (2,)))
 
 
 def plant(dataset: Path, fault: str) -> None:

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from golem.datasets.check import check
-from golem.datasets.store import Dataset
+from golem.datasets.findings import check
+from golem.datasets.store import DatasetFolder
 
 KILLS = int(os.environ.get("GOLEM_DATASET_KILLS", "6"))
 """How often a writer is killed; `scripts/kill_dataset_writer.sh` asks for 100."""
@@ -38,7 +38,7 @@ def test_no_finished_episode_is_lost_and_none_is_there_by_half(tmp_path: Path, k
         if not root.exists():
             assert finished == 0
             continue
-        data = Dataset(root)
+        data = DatasetFolder(root)
         # One more may be whole whose writer did not come to say so.
         assert finished <= len(data.episodes) <= finished + 1
         assert [str(finding) for finding in check(data)] == []

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from tests.datasets.conftest import SMALL, frames
 
-from golem.datasets.store import Dataset
+from golem.datasets.store import DatasetFolder
 
 HERE = Path(__file__).resolve().parent
 SCRIPT = HERE.parents[1] / "scripts" / "serve_policy.py"
@@ -59,7 +59,7 @@ def test_lerobot_reads_what_was_written(dataset: Path, python: str, tmp_path: Pa
 
 @pytest.mark.slow
 def test_a_checkpoint_of_lerobots_answers(dataset: Path, python: str, tmp_path: Path) -> None:
-    from golem.capabilities.policies.openpi import PolicyConfig, PolicyServer
+    from golem.capabilities.policies.openpi import PolicyLinkConfig, PolicyServer
     from golem.capabilities.policies.vectors import check_actions
 
     assert peer(python, "act", str(dataset), str(tmp_path / "act"))["parameters"] < 2e7
@@ -69,7 +69,7 @@ def test_a_checkpoint_of_lerobots_answers(dataset: Path, python: str, tmp_path: 
             assert process.stdout is not None
             said = next(line for line in process.stdout if line.startswith("Serving"))
             port = int(said.rsplit(":", 1)[1].strip(" .\n"))
-            server = PolicyServer(PolicyConfig(port=port, timeout=60.0))
+            server = PolicyServer(PolicyLinkConfig(port=port, timeout=60.0))
             frame = frames(1)[0]
             names = ("observation.state", "observation.images.right_hand")
             seen = {
@@ -89,4 +89,4 @@ def test_an_independent_checker_finds_no_fault_of_format(dataset: Path, python: 
         pytest.skip("needs lerobot-doctor beside lerobot")
     done = subprocess.run([doctor, str(dataset)], capture_output=True, text=True, timeout=300, env=ENVIRONMENT)
     assert "Summary" in done.stdout and "FAIL" not in done.stdout, done.stdout[-3000:]
-    assert len(Dataset(dataset).episodes) == 3
+    assert len(DatasetFolder(dataset).episodes) == 3

@@ -12,7 +12,7 @@ from golem.interfaces import topics
 from golem.runtime.executor import FOREVER
 from golem.runtime.lockstep import LockstepRunner
 from golem.teleop.driving import FAR, Driving
-from golem.teleop.pilot import Pilot, PilotConfig
+from golem.teleop.pilot import HandPilot, PilotConfig
 from golem.types import Array
 
 DOWN = {"hold": True, "right": {"v": [0.0, 0.0, -1.0, 0.0, 0.0, 0.0]}}
@@ -24,7 +24,7 @@ class Cockpit:
     """A pilot and the robot that follows."""
 
     def __init__(self, running: LockstepRunner, **config: Any) -> None:
-        self.running, self.pilot = running, Pilot(PilotConfig(**config))
+        self.running, self.pilot = running, HandPilot(PilotConfig(**config))
         self.driving = Driving(self.pilot, lambda: running.executor.t)
         self.run = running.start(self.driving, None)
         self.hands: list[tuple[float, Array, Array]] = []

@@ -10,7 +10,7 @@ import numpy as np
 
 from golem.teleop.driving import Driving
 from golem.teleop.gizmos import Gizmos
-from golem.teleop.pilot import Pilot
+from golem.teleop.pilot import HandPilot
 
 ORIGIN = np.array([0.0, 0.0, 1.3])
 
@@ -43,7 +43,7 @@ class Server:
 
 
 def test_a_dragged_gizmo_is_a_goal_in_odom_until_it_is_let_go_or_its_window_gone() -> None:
-    server, pilot = Server(), Pilot()
+    server, pilot = Server(), HandPilot()
     Gizmos(server, lambda p: p + ORIGIN, pilot, Driving(pilot))  # type: ignore[arg-type]
     right = server.handles["/world/right_goal"]
     right.position = np.array([0.4, -0.2, 1.2])
@@ -60,7 +60,7 @@ def test_a_dragged_gizmo_is_a_goal_in_odom_until_it_is_let_go_or_its_window_gone
 
 
 def test_two_windows_that_drag_are_a_fight() -> None:
-    server, pilot = Server(), Pilot()
+    server, pilot = Server(), HandPilot()
     Gizmos(server, lambda p: p + ORIGIN, pilot, Driving(pilot))  # type: ignore[arg-type]
     server.handles["/world/right_goal"].mouse("start", 1)
     server.handles["/world/left_goal"].mouse("start", 2)
@@ -68,7 +68,7 @@ def test_two_windows_that_drag_are_a_fight() -> None:
 
 
 def test_what_is_refused_stands_at_the_gizmo() -> None:
-    server, pilot = Server(), Pilot()
+    server, pilot = Server(), HandPilot()
     driving = Driving(pilot)
     gizmos = Gizmos(server, lambda p: p + ORIGIN, pilot, driving)  # type: ignore[arg-type]
     driving.refused["left"] = "outside the work space"

@@ -12,19 +12,19 @@ import pytest
 
 from golem.errors import ConfigError
 from golem.teleop.page import MOST, PilotPage
-from golem.teleop.pilot import Pilot
+from golem.teleop.pilot import HandPilot
 
 client = pytest.importorskip("websockets.sync.client")
 HOLD = json.dumps({"hold": True, "twist": [1, 0, 0]})
 
 
 @pytest.fixture
-def pilot() -> Pilot:
-    return Pilot()
+def pilot() -> HandPilot:
+    return HandPilot()
 
 
 @pytest.fixture
-def page(pilot: Pilot) -> Iterator[PilotPage]:
+def page(pilot: HandPilot) -> Iterator[PilotPage]:
     page = PilotPage(pilot, "127.0.0.1", 0, "http://127.0.0.1:1", lambda: {"t": 1.0})
     yield page
     page.close()
@@ -41,7 +41,7 @@ def soon(condition: Callable[[], bool]) -> bool:
     return condition()
 
 
-def moves(pilot: Pilot) -> bool:
+def moves(pilot: HandPilot) -> bool:
     return pilot.wish(time.monotonic()).moves
 
 
@@ -51,7 +51,7 @@ def test_it_serves_the_page_with_the_view_in_it(page: PilotPage) -> None:
     assert b'<iframe src="http://127.0.0.1:1"' in body and b"getGamepads" in body
 
 
-def test_a_window_drives_and_is_told_so(page: PilotPage, pilot: Pilot) -> None:
+def test_a_window_drives_and_is_told_so(page: PilotPage, pilot: HandPilot) -> None:
     with window(page) as socket:
         socket.send(HOLD)
         told = json.loads(socket.recv(timeout=5))
@@ -64,7 +64,7 @@ def test_a_window_drives_and_is_told_so(page: PilotPage, pilot: Pilot) -> None:
     assert not moves(pilot)
 
 
-def test_a_cut_connection_lets_go(page: PilotPage, pilot: Pilot) -> None:
+def test_a_cut_connection_lets_go(page: PilotPage, pilot: HandPilot) -> None:
     socket = window(page)
     socket.send(HOLD)
     socket.recv(timeout=5)
@@ -73,7 +73,7 @@ def test_a_cut_connection_lets_go(page: PilotPage, pilot: Pilot) -> None:
 
 
 @pytest.mark.parametrize("raw", ["", "{", "[]", '{"hold": NaN}', '{"hold": true, "twist": [1e999, 0, 0]}', b"\xff\xfe"])
-def test_nonsense_is_answered_and_drives_nobody(page: PilotPage, pilot: Pilot, raw: str | bytes) -> None:
+def test_nonsense_is_answered_and_drives_nobody(page: PilotPage, pilot: HandPilot, raw: str | bytes) -> None:
     with window(page) as socket:
         socket.send(HOLD)
         socket.recv(timeout=5)
@@ -82,7 +82,7 @@ def test_nonsense_is_answered_and_drives_nobody(page: PilotPage, pilot: Pilot, r
         assert not moves(pilot)
 
 
-def test_a_message_that_is_too_long_ends_its_window(page: PilotPage, pilot: Pilot) -> None:
+def test_a_message_that_is_too_long_ends_its_window(page: PilotPage, pilot: HandPilot) -> None:
     with window(page) as socket:
         socket.send(" " * (MOST + 1))
         with pytest.raises(Exception, match="1009|too big|no close frame"):
@@ -97,13 +97,13 @@ def test_pages_of_strangers_are_refused(page: PilotPage) -> None:
         pass
 
 
-def test_a_port_that_is_taken_is_named(page: PilotPage, pilot: Pilot) -> None:
+def test_a_port_that_is_taken_is_named(page: PilotPage, pilot: HandPilot) -> None:
     port = int(page.url.rsplit(":", 1)[1].strip("/"))
     with pytest.raises(ConfigError, match=str(port)):
         PilotPage(pilot, "127.0.0.1", port, "", dict)
 
 
-def test_another_machine_needs_the_token(pilot: Pilot) -> None:
+def test_another_machine_needs_the_token(pilot: HandPilot) -> None:
     page = PilotPage(pilot, "0.0.0.0", 0, "", dict)
     try:
         bare = page.url.partition("/?")[0].replace("0.0.0.0", "127.0.0.1")

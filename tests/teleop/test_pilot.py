@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from golem.teleop.pilot import SILENCE, BadMessage, Pilot
+from golem.teleop.pilot import SILENCE, BadMessage, HandPilot
 
 HOLD = {"hold": True, "right": {"v": [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]}}
 
 
 def test_only_a_held_switch_moves_anything() -> None:
-    pilot = Pilot()
+    pilot = HandPilot()
     pilot.hear("a", {**HOLD, "hold": False}, 0.0)
     assert not pilot.wish(0.0).moves
     pilot.hear("a", HOLD, 0.1)
@@ -21,21 +21,21 @@ def test_only_a_held_switch_moves_anything() -> None:
 
 
 def test_a_silent_window_has_let_go() -> None:
-    pilot = Pilot()
+    pilot = HandPilot()
     pilot.hear("a", HOLD, 0.0)
     assert pilot.wish(0.9 * SILENCE).moves
     assert not pilot.wish(1.1 * SILENCE).moves
 
 
 def test_a_window_that_is_gone_has_let_go() -> None:
-    pilot = Pilot()
+    pilot = HandPilot()
     pilot.hear("a", HOLD, 0.0)
     pilot.leave("a")
     assert not pilot.wish(0.0).moves
 
 
 def test_two_that_hold_get_nothing_until_both_let_go() -> None:
-    pilot = Pilot()
+    pilot = HandPilot()
     pilot.hear("a", HOLD, 0.0)
     pilot.hear("b", HOLD, 0.0)
     assert not pilot.wish(0.0).moves and pilot.state == "two"
@@ -49,7 +49,7 @@ def test_two_that_hold_get_nothing_until_both_let_go() -> None:
 
 
 def test_who_watches_disturbs_nobody() -> None:
-    pilot = Pilot()
+    pilot = HandPilot()
     pilot.hear("a", HOLD, 0.0)
     pilot.hear("b", {"hold": False, "twist": [1.0, 0.0, 0.0]}, 0.0)
     wish = pilot.wish(0.0)
@@ -57,7 +57,7 @@ def test_who_watches_disturbs_nobody() -> None:
 
 
 def test_a_drag_holds_until_it_is_let_go() -> None:
-    pilot, T = Pilot(), np.eye(4)
+    pilot, T = HandPilot(), np.eye(4)
     pilot.drag("view 1", "left", T, 0.0)
     assert pilot.wish(10.0).goals["left"] is T
     pilot.drag("view 1", "left", None, 10.0)
@@ -82,7 +82,7 @@ def test_a_drag_holds_until_it_is_let_go() -> None:
     ],
 )
 def test_nonsense_is_a_hand_off_the_switch(message: Any) -> None:
-    pilot = Pilot()
+    pilot = HandPilot()
     pilot.hear("a", HOLD, 0.0)
     with pytest.raises(BadMessage):
         pilot.hear("a", message, 0.1)

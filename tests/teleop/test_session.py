@@ -88,6 +88,6 @@ def test_a_window_drives_the_hand_and_a_second_one_stops_it(twin: tuple[Lockstep
         assert np.ptp(still) < 0.012
     finally:
         teleop.close()
-    from golem.datasets.store import Dataset
+    from golem.datasets.store import DatasetFolder
 
-    assert Dataset(tmp_path / "driven").episodes[0].length > 5
+    assert DatasetFolder(tmp_path / "driven").episodes[0].length > 5

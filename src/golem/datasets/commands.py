@@ -42,7 +42,7 @@ class PictureOptions:
 
 
 @dataclass(frozen=True)
-class RecordConfig:
+class RecordDatasetConfig:
     """Record trials of a rung as demonstrations: an episode per success. A data set that is there goes on."""
 
     dataset: Positional[Path]
@@ -69,7 +69,7 @@ class RecordConfig:
 
 
 @dataclass(frozen=True)
-class ExportConfig:
+class ExportDatasetConfig:
     """Export a bag, or the trials of a run folder, which are run again, as episodes of a data set."""
 
     source: Positional[Path]
@@ -84,7 +84,7 @@ class ExportConfig:
 
 
 @dataclass(frozen=True)
-class LiveConfig:
+class LiveDatasetConfig:
     """Record a domain as one episode of a data set, until Ctrl-C; what is not finished is not in it."""
 
     dataset: Positional[Path]
@@ -98,7 +98,7 @@ class LiveConfig:
 
 
 @dataclass(frozen=True)
-class ImportConfig:
+class ImportDatasetConfig:
     """Write an episode of a data set of this robot as a bag, which `robot: {use: replay}` and ROS 2 tools read."""
 
     dataset: Positional[Path]
@@ -110,7 +110,7 @@ class ImportConfig:
 
 
 @dataclass(frozen=True)
-class CheckConfig:
+class CheckDatasetConfig:
     """Check a data set: frame times, gaps, ranges, stuck sensors, and its videos against its table."""
 
     dataset: Positional[Path]
@@ -118,7 +118,7 @@ class CheckConfig:
 
 
 @dataclass(frozen=True)
-class DeleteConfig:
+class DeleteDatasetConfig:
     """Delete episodes; those that stay are numbered anew."""
 
     dataset: Positional[Path]
@@ -128,7 +128,7 @@ class DeleteConfig:
 
 
 @dataclass(frozen=True)
-class SplitConfig:
+class SplitDatasetConfig:
     """Split a data set in two: the first takes a share of the episodes, drawn by a seed."""
 
     dataset: Positional[Path]
@@ -144,7 +144,7 @@ class SplitConfig:
 
 
 @dataclass(frozen=True)
-class MergeConfig:
+class MergeDatasetConfig:
     """Merge data sets of the same features into a new one."""
 
     dataset: Positional[Path]
@@ -153,7 +153,7 @@ class MergeConfig:
     """Folders of the data sets."""
 
 
-def run_record(config: RecordConfig) -> int:
+def run_record(config: RecordDatasetConfig) -> int:
     """Record; return how many episodes were added.
 
     Raises:
@@ -174,7 +174,7 @@ def _trials(
     root: Path, specs: Any, what: Recipe, task: str, stages: tuple[str, ...] = (), failures: bool = False
 ) -> int:
     """Run trials, and add those that succeed to the data set in `root`; returns how many."""
-    from golem.datasets.writer import DatasetWriter
+    from golem.datasets.episode_writer import DatasetWriter
     from golem.evaluation.base import RUNGS, make_rung
     from golem.evaluation.harness.trials import run_trial
 
@@ -201,13 +201,13 @@ def _trials(
     return added
 
 
-def run_export(config: ExportConfig) -> int:
+def run_export(config: ExportDatasetConfig) -> int:
     """Export; return how many episodes were added.
 
     Raises:
         BagError, ConfigError, DatasetError, OutputError, MissingExtra: as the parts say.
     """
-    from golem.datasets.writer import DatasetWriter
+    from golem.datasets.episode_writer import DatasetWriter
 
     what = config.pictures.recipe()
     if (config.source / "trials.jsonl").exists():
@@ -224,7 +224,7 @@ def run_export(config: ExportConfig) -> int:
     return 1
 
 
-def _specs(config: ExportConfig) -> list[TrialSpec]:
+def _specs(config: ExportDatasetConfig) -> list[TrialSpec]:
     from golem.evaluation.harness.records import read_records
 
     records = {f"{r.method}:{r.index}": r for r in read_records(config.source / "trials.jsonl")}
@@ -234,14 +234,14 @@ def _specs(config: ExportConfig) -> list[TrialSpec]:
     return [r.spec for k, r in records.items() if (k in config.trials if config.trials else r.success)]
 
 
-def run_live(config: LiveConfig) -> int:
+def run_live(config: LiveDatasetConfig) -> int:
     """Record; return the frames of the episode.
 
     Raises:
         DatasetError, OutputError, MissingExtra: see `DatasetWriter`; also if nothing was on the domain.
         DdsError: the domain cannot be joined.
     """
-    from golem.datasets.writer import DatasetWriter
+    from golem.datasets.episode_writer import DatasetWriter
     from golem.interfaces.recorded import public_topics
     from golem.middleware.bags.recorder import Recorder
     from golem.middleware.dds.connect import connect
@@ -266,7 +266,7 @@ def run_live(config: LiveConfig) -> int:
     return frames
 
 
-def run_import(config: ImportConfig) -> int:
+def run_import(config: ImportDatasetConfig) -> int:
     """Write the bag; return its messages.
 
     Raises:
@@ -274,9 +274,9 @@ def run_import(config: ImportConfig) -> int:
         OutputError: the bag cannot be written.
     """
     from golem.capabilities.policies.vectors import EFFORT, STATE
-    from golem.datasets.store import Dataset
+    from golem.datasets.store import DatasetFolder
 
-    data = Dataset(config.dataset)
+    data = DatasetFolder(config.dataset)
     data.require("observation.state", "observation.effort", like={"observation.state": [*STATE]})
     data.require("observation.effort", like={"observation.effort": [*EFFORT]})
     episode = data.episode(config.episode)
@@ -290,16 +290,16 @@ def run_import(config: ImportConfig) -> int:
     return written
 
 
-def run_check(config: CheckConfig) -> bool:
+def run_check(config: CheckDatasetConfig) -> bool:
     """Print what is wrong; return whether nothing is.
 
     Raises:
         DatasetError: it cannot be read at all.
     """
-    from golem.datasets.check import check
-    from golem.datasets.store import Dataset
+    from golem.datasets.findings import check
+    from golem.datasets.store import DatasetFolder
 
-    data = Dataset(config.dataset)
+    data = DatasetFolder(config.dataset)
     found = list(check(data))
     for finding in found:
         print(finding)
@@ -308,23 +308,23 @@ def run_check(config: CheckConfig) -> bool:
     return not found
 
 
-def run_delete(config: DeleteConfig) -> None:
+def run_delete(config: DeleteDatasetConfig) -> None:
     """Delete; errors as for `rewritten`."""
-    from golem.datasets.store import Dataset
-    from golem.datasets.writer import drafts, rewritten
+    from golem.datasets.episode_writer import drafts, rewritten
+    from golem.datasets.store import DatasetFolder
 
-    data = Dataset(config.dataset)
+    data = DatasetFolder(config.dataset)
     gone = {data.episode(k).index for k in config.episodes}
     rewritten(data, config.dataset, drafts(data, [e.index for e in data.episodes if e.index not in gone]))
     print(f"{len(data.episodes) - len(gone)} episodes are left.")
 
 
-def run_split(config: SplitConfig) -> None:
+def run_split(config: SplitDatasetConfig) -> None:
     """Split; errors as for `rewritten`."""
-    from golem.datasets.store import Dataset
-    from golem.datasets.writer import drafts, rewritten
+    from golem.datasets.episode_writer import drafts, rewritten
+    from golem.datasets.store import DatasetFolder
 
-    data = Dataset(config.dataset)
+    data = DatasetFolder(config.dataset)
     n, order = len(data.episodes), np.random.default_rng(config.seed).permutation(len(data.episodes))
     count = round(config.share * n)
     if not 0 < count < n:
@@ -335,15 +335,15 @@ def run_split(config: SplitConfig) -> None:
         print(f"{len(chosen)} episodes in {root}.")
 
 
-def run_merge(config: MergeConfig) -> None:
+def run_merge(config: MergeDatasetConfig) -> None:
     """Merge; errors as for `rewritten`."""
-    from golem.datasets.store import Dataset
-    from golem.datasets.writer import drafts, rewritten
+    from golem.datasets.episode_writer import drafts, rewritten
+    from golem.datasets.store import DatasetFolder
 
     _refuse(config.dataset)
     if not config.sources:
         raise ConfigError("Say which data sets to merge.")
-    data = [Dataset(root) for root in config.sources]
+    data = [DatasetFolder(root) for root in config.sources]
     for other in data[1:]:
         if (other.fps, json.dumps(other.info["features"])) != (data[0].fps, json.dumps(data[0].info["features"])):
             raise ConfigError(f"{other.root} has other features or another rate than {data[0].root}.")

@@ -218,7 +218,7 @@ class _Errand:
 
     async def run(self, context: Any, goal: object) -> Any:
         """Ask, and do, until the errand is done or its time is over; see `Routine`."""
-        from golem.capabilities.policies.vectors import Vectors, moment
+        from golem.capabilities.policies.vectors import Vectors, instant
         from golem.interfaces import topics
         from golem.skills.base import SkillResult
 
@@ -226,7 +226,7 @@ class _Errand:
         context.publish(topics.CAMERAS_WANTED, tuple(env._cameras))
 
         def frame() -> dict[str, Any] | None:
-            now = moment(context.bus)
+            now = instant(context.bus)
             pictures = {name: context.bus.latest(topics.exposures(name)) for name in env._cameras}
             if now is None or any(picture is None for picture in pictures.values()):
                 return None
@@ -266,7 +266,7 @@ class Mover:
         import pinocchio as pin
 
         from golem.robots.model.magpie_model import MAX_GAP
-        from golem.skills.policy import FORCE
+        from golem.skills.served_policy import FORCE
 
         context, dt = self._context, self._context.period
         R = context.T_odom_base[:3, :3]

@@ -13,9 +13,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from golem.capabilities.policies.vectors import Moment, Vectors, moment
+from golem.capabilities.policies.vectors import Instant, Vectors, instant
+from golem.datasets.episode_writer import DatasetWriter
 from golem.datasets.schema import Recipe
-from golem.datasets.writer import DatasetWriter
 from golem.errors import ConfigError, unknown_name
 from golem.interfaces import images, public, topics
 from golem.interfaces import ros_convert as convert
@@ -66,7 +66,7 @@ class Sampler:
 
     def frame(self) -> dict[str, NDArray[Any]] | None:
         """Return a value for each feature; None before everything has spoken once."""
-        now = moment(self._bus)
+        now = instant(self._bus)
         seen = {name: self._bus.latest(topics.exposures(name)) for name in self._recipe.cameras}
         if now is None or any(exposure is None for exposure in seen.values()):
             return None
@@ -85,7 +85,7 @@ class Sampler:
         return out
 
 
-def vectors_of(vectors: Vectors, now: Moment) -> dict[str, NDArray[Any]]:
+def vectors_of(vectors: Vectors, now: Instant) -> dict[str, NDArray[Any]]:
     """Return the vectors of a moment by feature."""
     return {
         "observation.state": vectors.state(now),

@@ -15,7 +15,7 @@ from golem.datasets.schema import ABOUT, DATA, EPISODES, INFO, TASKS, VERSION, D
 
 
 @dataclass(frozen=True, slots=True)
-class Episode:
+class RecordedEpisode:
     """One episode.
 
     Attributes:
@@ -55,7 +55,7 @@ class Episode:
         return out
 
 
-class Dataset:
+class DatasetFolder:
     """A data set, open for reading.
 
     Attributes:
@@ -92,7 +92,7 @@ class Dataset:
             words = next(v for k, v in tasks.items() if k != "task_index")
             self.tasks = [words[tasks["task_index"].index(k)] for k in range(len(words))]
             self.episodes = [
-                Episode(int(r["episode_index"]), r) for r in sorted(rows, key=lambda r: r["episode_index"])
+                RecordedEpisode(int(r["episode_index"]), r) for r in sorted(rows, key=lambda r: r["episode_index"])
             ]
             lengths = sum(episode.length for episode in self.episodes)
         except (KeyError, ValueError, TypeError, OSError, StopIteration, extra("pyarrow").ArrowException) as error:
@@ -128,7 +128,7 @@ class Dataset:
                     f"the {len(wanted)} of this one."
                 )
 
-    def episode(self, index: int) -> Episode:
+    def episode(self, index: int) -> RecordedEpisode:
         """Return one episode.
 
         Raises:
@@ -138,7 +138,7 @@ class Dataset:
             raise DatasetError(f"The data set {self.root} has episodes 0 to {len(self.episodes) - 1}, no {index}.")
         return self.episodes[index]
 
-    def table(self, episode: Episode, columns: Sequence[str] | None = None) -> Any:
+    def table(self, episode: RecordedEpisode, columns: Sequence[str] | None = None) -> Any:
         """Return the frames of an episode as an Arrow table.
 
         Raises:
@@ -154,7 +154,7 @@ class Dataset:
             raise DatasetError(f"{path} has {table.num_rows} frames of episode {episode.index}, not {episode.length}.")
         return table
 
-    def values(self, episode: Episode, name: str) -> NDArray[Any]:
+    def values(self, episode: RecordedEpisode, name: str) -> NDArray[Any]:
         """Return the values (n, ...) of one feature of an episode that is in no video; errors as for `table`."""
         column = self.table(episode, [name, "episode_index"])[name].combine_chunks()
         while hasattr(column, "flatten"):
@@ -165,7 +165,7 @@ class Dataset:
         flat = column.to_numpy(zero_copy_only=False)
         return flat.reshape(episode.length, *shape) if shape != (1,) else flat.reshape(episode.length)
 
-    def pictures(self, episode: Episode, name: str) -> Iterator[NDArray[np.uint8]]:
+    def pictures(self, episode: RecordedEpisode, name: str) -> Iterator[NDArray[np.uint8]]:
         """Yield the pictures (height, width, 3) of one video of an episode, in order.
 
         Raises:

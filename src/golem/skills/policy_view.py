@@ -7,7 +7,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from golem.capabilities.policies.vectors import Vectors, moment
+from golem.capabilities.policies.vectors import Vectors, instant
 from golem.interfaces import topics
 from golem.skills.context import Context
 
@@ -33,7 +33,7 @@ class PolicyView:
     def __call__(self) -> dict[str, Any] | None:
         """Return the observation of this moment; None before everything has spoken once."""
         bus = self._context.bus
-        now = moment(bus)
+        now = instant(bus)
         seen = {name: bus.latest(topics.rgbd_images(name)) for name in self._cameras}
         if now is None or any(frame is None for frame in seen.values()):
             return None

@@ -12,8 +12,8 @@ from golem.interfaces import topics
 from golem.robots.model.magpie_model import MAX_GAP
 from golem.skills.base import SkillCancelled, SkillResult
 from golem.skills.context import Context
-from golem.skills.policy import FORCE
-from golem.teleop.pilot import Pilot, Wish
+from golem.skills.served_policy import FORCE
+from golem.teleop.pilot import HandPilot, Wish
 from golem.types import SIDES, Array, PlanarPose, Side, Twist
 
 LEAD = 0.10
@@ -40,7 +40,7 @@ class Driving:
         goals: (4, 4) where each palm is sent, in odom; None before it was moved.
     """
 
-    def __init__(self, pilot: Pilot, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, pilot: HandPilot, clock: Callable[[], float] = time.monotonic) -> None:
         """Go by what `pilot` wants by its `clock` [s]."""
         self._pilot, self._clock = pilot, clock
         self.refused: dict[Side, str] = dict.fromkeys(SIDES, "")

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from golem.dashboard.stage import WORLD
 from golem.teleop.driving import Driving
-from golem.teleop.pilot import Pilot
+from golem.teleop.pilot import HandPilot
 from golem.types import SIDES, Array, Side
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ class Gizmos:
     """Two gizmos of one server, and what is refused at them."""
 
     def __init__(
-        self, server: viser.ViserServer, from_odom: Callable[[Array], Array], pilot: Pilot, driving: Driving
+        self, server: viser.ViserServer, from_odom: Callable[[Array], Array], pilot: HandPilot, driving: Driving
     ) -> None:
         """Add them; `from_odom` brings a point (3,) of odom into the world that is shown, whose axes are the same."""
         self._origin, self._pilot, self._driving = from_odom(np.zeros(3)), pilot, driving

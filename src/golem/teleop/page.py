@@ -13,7 +13,7 @@ from typing import Any
 from golem.dashboard.server import LOCAL
 from golem.errors import ConfigError, MissingExtra
 from golem.middleware.web_gate import TokenGate, is_loopback
-from golem.teleop.pilot import BadMessage, Pilot
+from golem.teleop.pilot import BadMessage, HandPilot
 
 MOST = 4096
 """Bytes of a message."""
@@ -28,7 +28,7 @@ class PilotPage:
         url: where to open it.
     """
 
-    def __init__(self, pilot: Pilot, host: str, port: int, view: str, status: Callable[[], dict[str, Any]]) -> None:
+    def __init__(self, pilot: HandPilot, host: str, port: int, view: str, status: Callable[[], dict[str, Any]]) -> None:
         """Serve at `host` and `port`, with the live view at `view` in it, and tell windows the `status`.
 
         Raises:

@@ -84,7 +84,7 @@ class _Window:
     dragged: dict[Side, Array] = field(default_factory=dict[Side, Array])
 
 
-class Pilot:
+class HandPilot:
     """Takes what windows say, in their threads, and says what is wanted, in the robot's.
 
     A window that holds its switch while no other does has control until it lets go. Where two hold theirs nobody has

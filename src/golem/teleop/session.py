@@ -20,7 +20,7 @@ from golem.stack import load_stack
 from golem.teleop.driving import Driving
 from golem.teleop.gizmos import Gizmos
 from golem.teleop.page import PilotPage
-from golem.teleop.pilot import Pilot, PilotConfig
+from golem.teleop.pilot import HandPilot, PilotConfig
 from golem.types import SIDES
 
 SHOWN = 0.05
@@ -59,7 +59,7 @@ class Demonstrations:
 
     def __init__(self, running: LockstepRunner, root: Path, config: TeleopConfig) -> None:
         """Open the data set in `root`; errors as for `DatasetWriter`."""
-        from golem.datasets.writer import DatasetWriter
+        from golem.datasets.episode_writer import DatasetWriter
 
         self._recipe = config.pictures.recipe()
         self.period = 1.0 / self._recipe.fps
@@ -104,7 +104,7 @@ class Teleop:
     def __init__(self, config: TeleopConfig, running: LockstepRunner, robot: Any) -> None:
         """Serve; errors as for `LiveView`, `PilotPage` and `Demonstrations`."""
         self._running, self._next = running, 0.0
-        self.pilot = Pilot(config.pilot)
+        self.pilot = HandPilot(config.pilot)
         self.driving = Driving(self.pilot)
         with ExitStack() as opened:
             self.view = opened.enter_context(LiveView(running, shown(running, robot), config.port, config.host))

@@ -14,8 +14,8 @@ pytest.importorskip("msgpack")
 from tests.capabilities.grasping.things import can
 
 from golem.capabilities.grasping.base import SeeingLaw, ServoStatus
-from golem.capabilities.grasping.policy import FAR, PolicyGrasp, PolicyGraspConfig, PolicyLaw
-from golem.capabilities.policies.vectors import GRIPS, BadAction, palm_numbers
+from golem.capabilities.grasping.policy_grasp import FAR, PolicyGrasp, PolicyGraspConfig, PolicyLaw
+from golem.capabilities.policies.vectors import GRIPS, ActionRefused, palm_numbers
 from golem.errors import ConfigError
 from golem.evaluation.base import TrialSpec, rung_class
 from golem.types import Array
@@ -65,7 +65,7 @@ def test_a_step_too_far_is_refused() -> None:
     goal[0, 3] += FAR + 0.1
     one = law(goal, 0.05)
     one.see(0.0, "right", np.eye(4), lambda: {}, False)
-    with pytest.raises(BadAction, match=r"0.25 m away"):
+    with pytest.raises(ActionRefused, match=r"0.25 m away"):
         one.step(0.0, None, HAND)
 
 

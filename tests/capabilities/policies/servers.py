@@ -1,4 +1,4 @@
-"""Policy servers of OpenPI's protocol that answer as a test wants."""
+"""ActionPolicy servers of OpenPI's protocol that answer as a test wants."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ pytest.importorskip("websockets")
 pytest.importorskip("msgpack")
 from tests.capabilities.policies.servers import late, pack, policy_server
 
-from golem.capabilities.policies.openpi import PolicyConfig, PolicyServer
+from golem.capabilities.policies.openpi import PolicyLinkConfig, PolicyServer
 from golem.errors import ConfigError, ServiceUnavailable
 
 SEEN = {
@@ -29,7 +29,7 @@ def test_what_is_sent_comes_as_it_is_and_so_does_the_answer() -> None:
         return np.full((2, 25), 0.5, np.float32)
 
     with policy_server(answer) as port:
-        server = PolicyServer(PolicyConfig(port=port))
+        server = PolicyServer(PolicyLinkConfig(port=port))
         actions = server.infer(SEEN)
         assert actions.dtype == np.float32 and actions.shape == (2, 25) and server.about == {"name": "test"}
         assert np.array_equal(got[0]["observation.state"], SEEN["observation.state"]) and got[0]["prompt"] == "x"
@@ -53,7 +53,7 @@ def test_what_is_sent_comes_as_it_is_and_so_does_the_answer() -> None:
 )
 def test_nonsense_is_told(said: bytes | str, words: str) -> None:
     with policy_server(lambda seen: said) as port:
-        server = PolicyServer(PolicyConfig(port=port))
+        server = PolicyServer(PolicyLinkConfig(port=port))
         with pytest.raises(ServiceUnavailable, match=words):
             server.infer(SEEN)
         server.close()
@@ -63,12 +63,12 @@ def test_nobody_is_there() -> None:
     with socket.create_server(("127.0.0.1", 0)) as listener:
         port = listener.getsockname()[1]
     with pytest.raises(ServiceUnavailable, match=rf"127.0.0.1:{port} cannot be reached"):
-        PolicyServer(PolicyConfig(port=port)).infer(SEEN)
+        PolicyServer(PolicyLinkConfig(port=port)).infer(SEEN)
 
 
 def test_who_is_late_is_not_waited_for() -> None:
     with policy_server(late(1.0)) as port:
-        server, begun = PolicyServer(PolicyConfig(port=port, timeout=0.2)), time.monotonic()
+        server, begun = PolicyServer(PolicyLinkConfig(port=port, timeout=0.2)), time.monotonic()
         with pytest.raises(ServiceUnavailable, match="no answer within 0.2 s"):
             server.infer(SEEN)
         assert time.monotonic() - begun < 0.9
@@ -80,10 +80,10 @@ def test_who_dies_is_told() -> None:
 
     with policy_server(answer) as port:
         with pytest.raises(ServiceUnavailable, match="cannot be reached"):
-            PolicyServer(PolicyConfig(port=port)).infer(SEEN)
+            PolicyServer(PolicyLinkConfig(port=port)).infer(SEEN)
 
 
 @pytest.mark.parametrize("wrong", [{"port": 0}, {"timeout": 0.0}, {"latency": -1.0}, {"fps": 0}, {"host": "a/b"}])
 def test_options_that_make_no_sense(wrong: dict[str, Any]) -> None:
     with pytest.raises(ConfigError):
-        PolicyConfig(**wrong)
+        PolicyLinkConfig(**wrong)

@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from golem.capabilities.policies.openpi import PolicyConfig
+from golem.capabilities.policies.openpi import PolicyLinkConfig
 from golem.capabilities.policies.stream import ActionStream
 from golem.capabilities.policies.vectors import (
     ACTION,
     STATE,
-    BadAction,
-    Moment,
+    ActionRefused,
+    Instant,
     Vectors,
     check_actions,
     palm_numbers,
@@ -33,7 +33,7 @@ def test_every_number_is_where_its_name_says() -> None:
     hand = HandState(0.0, 0.04, np.array([0.02, 0.02]), np.array([1.0, 2.0]))
     full = {name: np.zeros(27) for name in ("dq", "tau", "kd")}
     command = LowCommand(0.0, q + 0.1, kp=np.where(np.arange(27) == 3, 0.0, 50.0), **full)
-    now = Moment(
+    now = Instant(
         LowState(0.0, q, -q, np.zeros(27), IMU), base, {"right": hand}, command,
         {"left": HandCommand(0.0, 0.0, 3.0)}, Twist(0.1, 0.2, 0.3, math.nan),
     )  # fmt: skip
@@ -64,7 +64,7 @@ def test_a_palm_is_nine_numbers_and_comes_back() -> None:
     R = palm_pose(rough)[:3, :3]
     np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-12)
     for bad in (np.full(9, np.nan), np.zeros(9), np.array([0, 0, 0, 1, 0, 0, 2, 0, 0.0])):
-        with pytest.raises(BadAction):
+        with pytest.raises(ActionRefused):
             palm_pose(bad)
 
 
@@ -80,7 +80,7 @@ def test_a_palm_is_nine_numbers_and_comes_back() -> None:
     ],
 )
 def test_actions_that_are_none(value: Any, words: str) -> None:
-    with pytest.raises(BadAction, match=words):
+    with pytest.raises(ActionRefused, match=words):
         check_actions(value)
 
 
@@ -108,19 +108,19 @@ def times(stream: ActionStream, seconds: float) -> list[tuple[float, float, floa
 
 
 def test_the_latency_is_charged() -> None:
-    given = times(ActionStream(Counting(), PolicyConfig(fps=10, use=5, latency=0.2)), 1.5)
+    given = times(ActionStream(Counting(), PolicyLinkConfig(fps=10, use=5, latency=0.2)), 1.5)
     assert given[0] == (0.2, 0.0, 2.0)  # asked at 0: the first two are over
     assert (0.5, 0.0, 5.0) in given  # the next observation goes out, and the old ones go on
     assert (0.69, 0.0, 6.0) in given and (0.7, 1.0, 2.0) in given
 
 
 def test_without_latency_the_first_action_is_the_first() -> None:
-    given = times(ActionStream(Counting(), PolicyConfig(fps=10, use=5, latency=0.0)), 0.6)
+    given = times(ActionStream(Counting(), PolicyLinkConfig(fps=10, use=5, latency=0.0)), 0.6)
     assert given[0] == (0.0, 0.0, 0.0) and (0.49, 0.0, 4.0) in given and (0.5, 1.0, 0.0) in given
 
 
 def test_a_chunk_that_is_over_holds_its_last_action() -> None:
-    given = times(ActionStream(Counting(3), PolicyConfig(fps=10, use=8, latency=1.0)), 1.2)
+    given = times(ActionStream(Counting(3), PolicyLinkConfig(fps=10, use=8, latency=1.0)), 1.2)
     assert given[0] == (1.0, 0.0, 2.0) and given[-1][2] == 2.0
 
 
@@ -134,7 +134,7 @@ def test_live_nobody_waits_and_who_is_late_is_given_up() -> None:
             go.wait(5.0)
             return super().infer(observation)
 
-    stream = ActionStream(Slow(), PolicyConfig(timeout=0.5))
+    stream = ActionStream(Slow(), PolicyLinkConfig(timeout=0.5))
     assert stream.step(0.0, lambda: {}, live=True) is None
     assert stream.step(0.3, lambda: {}, live=True) is None
     with pytest.raises(ServiceUnavailable, match="0.5 s"):

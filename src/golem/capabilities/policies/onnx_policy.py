@@ -24,7 +24,7 @@ MEASURED = [list(STATE).index(list(ACTION)[i]) for i in POSITIONS]
 
 
 class OnnxPolicy:
-    """A network on the CPU, one thread; see `Policy`.
+    """A network on the CPU, one thread; see `ActionPolicy`.
 
     Attributes:
         camera: whose pictures it wants.
@@ -51,7 +51,7 @@ class OnnxPolicy:
             raise ConfigError(f"{path} is no policy of `golem train act`: {shorten(str(error))}.") from error
 
     def infer(self, observation: Mapping[str, Any]) -> Array:
-        """Return the chunk of actions (n, 25) for an observation; see `Policy`."""
+        """Return the chunk of actions (n, 25) for an observation; see `ActionPolicy`."""
         state = np.asarray(observation["observation.state"], np.float32)
         picture = np.asarray(observation[f"observation.images.{self.camera}"])
         if picture.shape[1::-1] != self._size:

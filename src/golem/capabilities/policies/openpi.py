@@ -19,7 +19,7 @@ from golem.options import require
 
 
 @dataclass(frozen=True)
-class PolicyConfig:
+class PolicyLinkConfig:
     """Where the policy server is, what it is sent, and what its time costs.
 
     Attributes:
@@ -67,7 +67,7 @@ class PolicyServer:
         about: what it said about itself.
     """
 
-    def __init__(self, config: PolicyConfig) -> None:
+    def __init__(self, config: PolicyLinkConfig) -> None:
         """Take the address.
 
         Raises:

@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 from golem.capabilities.policies.onnx_policy import OnnxPolicy
-from golem.capabilities.policies.openpi import PolicyConfig, PolicyServer
+from golem.capabilities.policies.openpi import PolicyLinkConfig, PolicyServer
 from golem.capabilities.policies.vectors import check_actions
 from golem.errors import ServiceUnavailable
 from golem.types import Array
 
 
-class Policy(Protocol):
+class ActionPolicy(Protocol):
     """Whoever answers observations."""
 
     def infer(self, observation: Mapping[str, Any]) -> Any:
@@ -28,7 +28,7 @@ class Policy(Protocol):
         ...
 
 
-C = TypeVar("C", bound=PolicyConfig)
+C = TypeVar("C", bound=PolicyLinkConfig)
 
 
 def open_policy(config: C) -> tuple[PolicyServer | OnnxPolicy, C]:
@@ -51,7 +51,7 @@ class ActionStream:
     counts when it comes. Its i-th action is for t + i / fps: those that are over by then are left out.
     """
 
-    def __init__(self, policy: Policy, config: PolicyConfig) -> None:
+    def __init__(self, policy: ActionPolicy, config: PolicyLinkConfig) -> None:
         """Ask `policy`."""
         self._policy, self._config = policy, config
         self._pool = ThreadPoolExecutor(1, "policy")
@@ -69,7 +69,7 @@ class ActionStream:
 
         Raises:
             ServiceUnavailable: the server is not there, refuses, or takes longer than it may.
-            BadAction: what it answered is no action.
+            ActionRefused: what it answered is no action.
         """
         c = self._config
         if self._job is not None:

@@ -54,12 +54,12 @@ SHUT = 0.004
 """Opening that is asked for below which a hand closes [m] [own]."""
 
 
-class BadAction(GolemError):
+class ActionRefused(GolemError):
     """What a policy answered is no action of this robot."""
 
 
 @dataclass(frozen=True, slots=True)
-class Moment:
+class Instant:
     """What is measured and commanded at one time; commands before the first are None.
 
     Attributes:
@@ -75,7 +75,7 @@ class Moment:
     twist: Twist = field(default_factory=Twist)
 
 
-def moment(bus: Bus) -> Moment | None:
+def instant(bus: Bus) -> Instant | None:
     """Return what is newest on `bus`; None before the motors and the base estimate have spoken."""
     state, base = bus.latest(topics.LOW_STATE), bus.latest(topics.BASE)
     if state is None or base is None:
@@ -84,7 +84,7 @@ def moment(bus: Bus) -> Moment | None:
     grips = {side: grip for side in SIDES if (grip := bus.latest(topics.hand_command(side))) is not None}
     legs = bus.latest(topics.LEG_STATUS)
     command = bus.latest(topics.LOW_CMD)
-    return Moment(state, base, hands, command, grips, Twist() if legs is None else legs.commanded)
+    return Instant(state, base, hands, command, grips, Twist() if legs is None else legs.commanded)
 
 
 class Vectors:
@@ -94,7 +94,7 @@ class Vectors:
         """Build the model for forward kinematics."""
         self._kinematics = Kinematics()
 
-    def state(self, now: Moment) -> Array:
+    def state(self, now: Instant) -> Array:
         """Return the state (85,), see `STATE`; a hand that has not reported is shut and feels nothing."""
         R = now.base.T_odom_base[:3, :3]
         hands = [now.hands.get(side) for side in SIDES]
@@ -104,7 +104,7 @@ class Vectors:
         base = ([now.base.height], R.T @ now.base.velocity, R[2])
         return np.concatenate([now.state.q, now.state.dq, palms, gaps, *forces, *base])
 
-    def action(self, now: Moment) -> Array:
+    def action(self, now: Instant) -> Array:
         """Return the action (25,), see `ACTION`; what was not commanded yet is what is measured."""
         q = self.targets(now)
         gaps = [grip.gap if (grip := now.grips.get(s)) else h.gap if (h := now.hands.get(s)) else 0.0 for s in SIDES]
@@ -112,7 +112,7 @@ class Vectors:
         height = 0.0 if height is None or not math.isfinite(height) else height
         return np.concatenate([self._palms(q), gaps, [q[UPPER.start], twist.vx, twist.vy, twist.wz, height]])
 
-    def targets(self, now: Moment) -> Array:
+    def targets(self, now: Instant) -> Array:
         """Return the joint targets (27,) [rad]; where the gate does not move a motor, its position."""
         if now.command is None:
             return now.state.q
@@ -132,17 +132,17 @@ def palm_pose(numbers: Array) -> Array:
     """Return the (4, 4) pose of nine numbers, its rotation made one (Gram and Schmidt).
 
     Raises:
-        BadAction: they are not finite, or their two columns are no two directions.
+        ActionRefused: they are not finite, or their two columns are no two directions.
     """
     x, y = numbers[3:6], numbers[6:9]
     if not np.isfinite(numbers).all():
-        raise BadAction("A palm of the action is not finite.")
+        raise ActionRefused("A palm of the action is not finite.")
     size = float(np.linalg.norm(x))
     x = x / max(size, 1e-9)
     y = y - (y @ x) * x
     width = float(np.linalg.norm(y))
     if size < 0.1 or width < 0.1:
-        raise BadAction("The rotation of a palm of the action has no two directions.")
+        raise ActionRefused("The rotation of a palm of the action has no two directions.")
     y, T = y / width, np.eye(4)
     T[:3, 0], T[:3, 1], T[:3, 2], T[:3, 3] = x, y, np.cross(x, y), numbers[:3]
     return T
@@ -152,14 +152,14 @@ def check_actions(value: object) -> Array:
     """Return a chunk of actions (n, 25), n >= 1; one action is a chunk, too.
 
     Raises:
-        BadAction: it has another size, or is not finite.
+        ActionRefused: it has another size, or is not finite.
     """
     try:
         actions = np.atleast_2d(np.asarray(value, np.float64))
     except (TypeError, ValueError) as error:
-        raise BadAction("The policy's actions are no array of numbers.") from error
+        raise ActionRefused("The policy's actions are no array of numbers.") from error
     if actions.ndim != 2 or actions.shape[1] != len(ACTION) or not len(actions):
-        raise BadAction(f"The policy's actions have shape {actions.shape}; this robot's are (n, {len(ACTION)}).")
+        raise ActionRefused(f"The policy's actions have shape {actions.shape}; this robot's are (n, {len(ACTION)}).")
     if not np.isfinite(actions).all():
-        raise BadAction("The policy's actions contain NaN or infinity.")
+        raise ActionRefused("The policy's actions contain NaN or infinity.")
     return actions

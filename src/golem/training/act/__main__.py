@@ -18,9 +18,9 @@ from tyro.conf import Positional
 
 from golem.capabilities.policies.onnx_policy import MEASURED, META, POSITIONS
 from golem.capabilities.policies.vectors import ACTION, STATE
-from golem.datasets.store import Dataset
+from golem.datasets.store import DatasetFolder
 from golem.errors import ConfigError
-from golem.training.act.network import Act
+from golem.training.act.act_network import ActNetwork
 
 SEEN = tuple(name for name in STATE if "hand." in name or name.endswith("palm.z"))
 """Entries of the state that go in [own]: with joints and places a policy learns where the screws of its data were."""
@@ -59,7 +59,7 @@ def train_act(
     if min(width // 16, chunk, steps, batch, held_out) < 1:
         raise ConfigError("--width is 16 or more, and --chunk, --steps, --batch and --held-out are 1 or more.")
     torch.manual_seed(seed)
-    rng, data = np.random.default_rng(seed), Dataset(dataset)
+    rng, data = np.random.default_rng(seed), DatasetFolder(dataset)
     video = f"observation.images.{camera}"
     data.require("observation.state", "action", video, like={"observation.state": [*STATE], "action": [*ACTION]})
     if len(data.episodes) <= held_out:
@@ -70,7 +70,7 @@ def train_act(
     size = width, round(width * high / wide)
     episodes = [_Frames(data, k, video, size, chunk) for k in range(len(data.episodes))]
     learned, held = _joined(episodes[:-held_out]), _joined(episodes[-held_out:])
-    net = Act(len(SEEN), len(ACTION), chunk, size)
+    net = ActNetwork(len(SEEN), len(ACTION), chunk, size)
     known = learned["known"] > 0.5
     with torch.no_grad():
         for name, values in (("in", learned["state"]), ("out", learned["actions"][known])):
@@ -111,7 +111,7 @@ def train_act(
 class _Frames:
     """The frames of one episode, each with the actions that follow it."""
 
-    def __init__(self, data: Dataset, index: int, video: str, size: tuple[int, int], chunk: int) -> None:
+    def __init__(self, data: DatasetFolder, index: int, video: str, size: tuple[int, int], chunk: int) -> None:
         episode = data.episode(index)
         n = episode.length
         state, action = data.values(episode, "observation.state"), data.values(episode, "action")
@@ -131,7 +131,7 @@ def _joined(episodes: list[_Frames]) -> dict[str, Any]:
     return {name: torch.cat([e.tensors[name] for e in episodes]) for name in episodes[0].tensors}
 
 
-def _palm_error(net: Act, frames: dict[str, Any]) -> float:
+def _palm_error(net: ActNetwork, frames: dict[str, Any]) -> float:
     """Return the mean error of the right palm's positions over the chunks [m]."""
     net.eval()
     with torch.no_grad():
@@ -140,7 +140,7 @@ def _palm_error(net: Act, frames: dict[str, Any]) -> float:
     return float((off * frames["known"]).sum() / frames["known"].sum())
 
 
-def _save(net: Act, out: Path, camera: str, size: tuple[int, int], fps: int) -> None:
+def _save(net: ActNetwork, out: Path, camera: str, size: tuple[int, int], fps: int) -> None:
     """Write the network and what goes in, whole or not at all."""
     net.eval()
     part = out.with_name(out.name + ".part")

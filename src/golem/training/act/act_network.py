@@ -13,7 +13,7 @@ from torch import Tensor, nn
 LATENT = 16
 
 
-class Act(nn.Module):
+class ActNetwork(nn.Module):
     """State (b, s) and picture (b, 3, h, w) of 0 to 255 in, actions (b, n, a) out, all as they are in the data set.
 
     Attributes:

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from golem.capabilities.policies.openpi import PolicyConfig
+from golem.capabilities.policies.openpi import PolicyLinkConfig
 from golem.capabilities.policies.stream import ActionStream, open_policy
-from golem.capabilities.policies.vectors import GRIPS, HEIGHT, SHUT, TORSO, TWIST, BadAction, palm_pose
+from golem.capabilities.policies.vectors import GRIPS, HEIGHT, SHUT, TORSO, TWIST, ActionRefused, palm_pose
 from golem.errors import ServiceUnavailable
 from golem.options import require
 from golem.robots.model.magpie_model import MAX_GAP
@@ -46,9 +46,9 @@ class PolicySkill:
 
     Goal = PolicyGoal
 
-    def __init__(self, config: PolicyConfig | None = None) -> None:
+    def __init__(self, config: PolicyLinkConfig | None = None) -> None:
         """Take the server's address; it is asked when the skill runs."""
-        self._config = config or PolicyConfig()
+        self._config = config or PolicyLinkConfig()
         self._gaps: list[float | None] = [None, None]
 
     def timeout(self, goal: PolicyGoal) -> float:
@@ -72,7 +72,7 @@ class PolicySkill:
                     if action is not None:
                         self._do(context, action)
                     await context.tick()
-            except (ServiceUnavailable, BadAction) as fault:
+            except (ServiceUnavailable, ActionRefused) as fault:
                 context.legs.drive(Twist())
                 return SkillResult(False, "policy", "skill", f"{fault} The arms stay where they are.")
         context.legs.drive(Twist())
@@ -82,7 +82,7 @@ class PolicySkill:
         """Do one action.
 
         Raises:
-            BadAction: a hand cannot be meant to go there.
+            ActionRefused: a hand cannot be meant to go there.
         """
         T = context.T_odom_base
         goals = {side: T @ palm_pose(action[9 * k : 9 * k + 9]) for k, side in enumerate(SIDES)}
@@ -106,8 +106,8 @@ def check_near(side: str, goal: Array, pose: Array) -> None:
     """Check that a hand at `pose` may be meant to go to `goal`, (4, 4) each.
 
     Raises:
-        BadAction: it is further away than a policy sends a hand in one step.
+        ActionRefused: it is further away than a policy sends a hand in one step.
     """
     far = float(np.linalg.norm(goal[:3, 3] - pose[:3, 3]))
     if far > FAR:
-        raise BadAction(f"The policy sends the {side} hand {far:.2f} m away in one step; {FAR:g} m is the most.")
+        raise ActionRefused(f"The policy sends the {side} hand {far:.2f} m away in one step; {FAR:g} m is the most.")

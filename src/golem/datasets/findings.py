@@ -9,7 +9,7 @@ import numpy as np
 
 from golem.capabilities.policies.vectors import ACTION, COMMAND, STATE
 from golem.datasets.schema import DatasetError
-from golem.datasets.store import Dataset, Episode
+from golem.datasets.store import DatasetFolder, RecordedEpisode
 from golem.types import Array
 
 TIME = 1e-4
@@ -23,7 +23,7 @@ MOVED, STUCK = 0.05, 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class DatasetFinding:
     """What is wrong.
 
     Attributes:
@@ -39,23 +39,23 @@ class Finding:
         return self.what if self.episode is None else f"Episode {self.episode}: {self.what}"
 
 
-def check(dataset: Dataset) -> Iterator[Finding]:
+def check(dataset: DatasetFolder) -> Iterator[DatasetFinding]:
     """Yield what is wrong with `dataset`."""
     first = 0
     for episode in dataset.episodes:
         try:
-            yield from (Finding(episode.index, what) for what in _frames(dataset, episode, first))
+            yield from (DatasetFinding(episode.index, what) for what in _frames(dataset, episode, first))
             for name in dataset.videos:
-                yield from (Finding(episode.index, f"{name}: {what}") for what in _video(dataset, episode, name))
+                yield from (DatasetFinding(episode.index, f"{name}: {what}") for what in _video(dataset, episode, name))
         except DatasetError as error:
-            yield Finding(episode.index, str(error))
+            yield DatasetFinding(episode.index, str(error))
         first += episode.length
     used = {task for episode in dataset.episodes for task in episode.tasks}
     for task in sorted(set(dataset.tasks) - used):
-        yield Finding(None, f"No episode does the task '{task}'.")
+        yield DatasetFinding(None, f"No episode does the task '{task}'.")
 
 
-def _frames(dataset: Dataset, episode: Episode, first: int) -> Iterator[str]:
+def _frames(dataset: DatasetFolder, episode: RecordedEpisode, first: int) -> Iterator[str]:
     table = dataset.table(episode)
     at = np.arange(episode.length)
     for name, wanted in (
@@ -107,7 +107,7 @@ def _stuck(q: Array, command: Array, fps: int) -> Iterator[str]:
                 break
 
 
-def _video(dataset: Dataset, episode: Episode, name: str) -> Iterator[str]:
+def _video(dataset: DatasetFolder, episode: RecordedEpisode, name: str) -> Iterator[str]:
     height, width = dataset.features[name].shape[:2]
     state = dataset.values(episode, "observation.state") if "observation.state" in dataset.features else None
     last: np.ndarray | None = None

@@ -38,7 +38,7 @@ from golem.datasets.schema import (
     statistics,
     tasks_table,
 )
-from golem.datasets.store import Dataset
+from golem.datasets.store import DatasetFolder
 from golem.datasets.swap import beside, held, link, replaced
 from golem.errors import OutputError
 
@@ -131,7 +131,7 @@ class DatasetWriter:
             }
             self.episodes = 0
             if root.exists() and any(root.iterdir()):
-                there = Dataset(root)
+                there = DatasetFolder(root)
                 here = described(self._features, self._fps)
                 # By way of JSON, where a tuple is a list.
                 if there.fps != self._fps or there.info["features"] != json.loads(json.dumps(here)):
@@ -211,7 +211,7 @@ class DatasetWriter:
                 video.finish()
                 stats[name] = picture_statistics(video.counts, self.length)
             videos = {name: folder / f"{name}.mp4" for name in self._videos}
-            old = drafts(Dataset(self.root)) if self.episodes else []
+            old = drafts(DatasetFolder(self.root)) if self.episodes else []
             new = Draft([self._task], self.length, folder / "data.parquet", videos, stats)
             compose(self.root, [*old, new], self._features, self._fps, self._about)
         except (OSError, extra("av").FFmpegError) as error:
@@ -279,7 +279,7 @@ def _column(values: np.ndarray[Any, Any], feature: Feature) -> Any:
     return pa.ListArray.from_arrays(pa.array(np.arange(0, n * height + 1, height, dtype=np.int32)), lines)
 
 
-def drafts(dataset: Dataset, chosen: Sequence[int] | None = None) -> list[Draft]:
+def drafts(dataset: DatasetFolder, chosen: Sequence[int] | None = None) -> list[Draft]:
     """Return episodes of a data set, by default all, as those of another one.
 
     Raises:
@@ -387,7 +387,7 @@ def _write_json(path: Path, value: Any) -> None:
     path.write_text(json.dumps(value, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
-def rewritten(dataset: Dataset, root: Path, episodes: Sequence[Draft]) -> None:
+def rewritten(dataset: DatasetFolder, root: Path, episodes: Sequence[Draft]) -> None:
     """Let `root` be a data set like `dataset` of `episodes`; errors as for `compose`."""
     with held(root):
         compose(root, episodes, read_features(dataset.info), dataset.fps, dataset.about)

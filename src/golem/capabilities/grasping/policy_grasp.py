@@ -14,9 +14,9 @@ import numpy as np
 
 from golem.capabilities.grasping.base import Grasp, ServoLaw, ServoStatus, ServoStep
 from golem.capabilities.grasping.centroid import Centroid
-from golem.capabilities.policies.openpi import PolicyConfig
-from golem.capabilities.policies.stream import ActionStream, Policy, open_policy
-from golem.capabilities.policies.vectors import GRIPS, BadAction, palm_pose
+from golem.capabilities.policies.openpi import PolicyLinkConfig
+from golem.capabilities.policies.stream import ActionPolicy, ActionStream, open_policy
+from golem.capabilities.policies.vectors import GRIPS, ActionRefused, palm_pose
 from golem.types import SIDES, Array, LocalizedObject, Side
 
 FAR = 0.15
@@ -26,7 +26,7 @@ AGREED = 3
 
 
 @dataclass(frozen=True)
-class PolicyGraspConfig(PolicyConfig):
+class PolicyGraspConfig(PolicyLinkConfig):
     """The server, and how the hand goes by it.
 
     Attributes:
@@ -43,7 +43,7 @@ class PolicyGraspConfig(PolicyConfig):
 class PolicyLaw:
     """A servo law that sees for itself; see `golem.capabilities.grasping.base.SeeingLaw`."""
 
-    def __init__(self, policy: Policy, config: PolicyGraspConfig, target: LocalizedObject, gap: float) -> None:
+    def __init__(self, policy: ActionPolicy, config: PolicyGraspConfig, target: LocalizedObject, gap: float) -> None:
         """Ask `policy`; the hand arrives with an opening of `gap` [m]."""
         self.label, self.patience = target.label, config.patience
         self.cameras, self.width, self.prompt = config.cameras, config.width, config.prompt
@@ -57,7 +57,7 @@ class PolicyLaw:
         """Take the action that is due; see `SeeingLaw`.
 
         Raises:
-            ServiceUnavailable, BadAction: see `ActionStream.step`.
+            ServiceUnavailable, ActionRefused: see `ActionStream.step`.
         """
         action, k = self._stream.step(t, observe, live), SIDES.index(side)
         if action is not None:
@@ -69,12 +69,12 @@ class PolicyLaw:
         """Go where the policy said last; see `ServoLaw`.
 
         Raises:
-            BadAction: that is nowhere near the hand.
+            ActionRefused: that is nowhere near the hand.
         """
         T = T_odom_gripper if self._target is None else self._target[0]
         far = float(np.linalg.norm(T[:3, 3] - T_odom_gripper[:3, 3]))
         if far > FAR:
-            raise BadAction(f"The policy sends the hand {far:.2f} m away in one step; {FAR:g} m is the most.")
+            raise ActionRefused(f"The policy sends the hand {far:.2f} m away in one step; {FAR:g} m is the most.")
         status = ServoStatus.CONVERGED if self._shut >= AGREED else ServoStatus.TRACKING
         return ServoStep(T, T[:3, 3].copy(), 0.0, status)
 

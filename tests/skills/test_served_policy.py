@@ -32,10 +32,10 @@ def run(
         arms = running._stack.context.arms
         before = np.array([arms[side].pose[:3, 3] for side in ("left", "right")])
         with policy_server(answer) as port:
-            from golem.capabilities.policies.openpi import PolicyConfig
-            from golem.skills.policy import PolicyGoal, PolicySkill
+            from golem.capabilities.policies.openpi import PolicyLinkConfig
+            from golem.skills.served_policy import PolicyGoal, PolicySkill
 
-            skill = PolicySkill(PolicyConfig(port=port, cameras=(), timeout=timeout))
+            skill = PolicySkill(PolicyLinkConfig(port=port, cameras=(), timeout=timeout))
             result = running.execute(skill, PolicyGoal("down", seconds))
         after = np.array([arms[side].pose[:3, 3] for side in ("left", "right")])
         return result, after - before
