@@ -7,7 +7,7 @@ from collections import defaultdict
 from pathlib import Path
 
 from golem.evaluation.harness.records import read_records
-from golem.evaluation.report.condition_plot import draw_share
+from golem.evaluation.report.svg_figure import draw_share
 from golem.figures import blank_figure
 
 COLUMNS = 3

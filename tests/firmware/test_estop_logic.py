@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from golem.hardware.drivers.estop_frame import SIZE, BoardFrame, FrameParser, checksum
+from golem.hardware.estop.serial_board import SIZE, BoardFrame, FrameParser, checksum
 
 FIRMWARE = Path(__file__).resolve().parents[2] / "firmware" / "estop"
 RELEASE_SAMPLES = 50

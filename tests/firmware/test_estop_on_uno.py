@@ -6,8 +6,7 @@ import pytest
 from tests.firmware.conftest import Uno
 from tests.hardware.conftest import DT, Bench
 
-from golem.hardware.drivers.estop_frame import BoardFrame, FrameParser
-from golem.hardware.estop.serial_board import SerialEstop
+from golem.hardware.estop.serial_board import BoardFrame, FrameParser, SerialEstop
 from golem.hardware.safety.base import OperatorRequest, SafetyLimits
 from golem.hardware.safety.gate import Gate
 from golem.interfaces.payloads import EstopMessage, GateState, Reason

@@ -13,9 +13,9 @@ from golem.capabilities.mapping.voxel_grid import VoxelGridMapper
 from golem.errors import ModuleFault
 from golem.evaluation.conformance.mapper_suite import MapperSuite
 from golem.interfaces import topics
-from golem.interfaces.nav_convert import occupancy_grid
 from golem.interfaces.nav_payloads import MapFile, OccupancyGrid
 from golem.interfaces.payloads import Odometry
+from golem.interfaces.ros_convert import occupancy_grid
 from golem.middleware.bus import Bus
 from golem.robots.model.spatial import transform
 from golem.runtime.contract_check import ContractCheck

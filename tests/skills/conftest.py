@@ -11,7 +11,7 @@ import pytest
 from golem.capabilities.grasping.base import GraspMethod
 from golem.capabilities.grasping.visual_servo import VisualServo
 from golem.capabilities.memory.object_map import ObjectMap
-from golem.capabilities.planning.straight import Straight
+from golem.capabilities.planning.rrt_connect import Straight
 from golem.capabilities.properties.property_table import PropertyTable
 from golem.interfaces import topics
 from golem.interfaces.payloads import Detections, GripState, HandStatus

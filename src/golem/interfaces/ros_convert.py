@@ -10,14 +10,16 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from golem.interfaces.nav_payloads import NavPath, OccupancyGrid
 from golem.interfaces.payloads import Detections, EstopMessage, GateState, GateStatus, HandStatus, LegStatus, Reason
 from golem.middleware.ros.message import NANO, CodecError
-from golem.middleware.ros.msgs import diagnostic_msgs, geometry_msgs, golem_interfaces, sensor_msgs
+from golem.middleware.ros.msgs import diagnostic_msgs, geometry_msgs, golem_interfaces, nav_msgs, sensor_msgs
 from golem.middleware.ros.msgs.builtin_interfaces import Duration, Time
+from golem.middleware.ros.msgs.geometry_msgs import PoseStamped
 from golem.middleware.ros.msgs.nav_msgs import Odometry
 from golem.middleware.ros.msgs.std_msgs import Float64, Header
 from golem.middleware.ros.msgs.tf2_msgs import TFMessage
-from golem.types import Array, BaseEstimate, HandCommand, HandState, Imu, Twist
+from golem.types import Array, BaseEstimate, HandCommand, HandState, Imu, PlanarPose, Twist
 
 POSE_COVARIANCE = np.diag(np.square([0.03, 0.03, 0.01, 0.01, 0.01, 0.03])).ravel()
 """Of position [m^2] and roll, pitch, yaw [rad^2], in odom [own: what 3 m of walking add, `golem bench estimation`; the
@@ -353,3 +355,35 @@ def to_gate_status(message: golem_interfaces.SafetyStatus) -> GateStatus:
 def estop_frame(frame: EstopMessage) -> golem_interfaces.EstopFrame:
     """Return a frame of the emergency stop."""
     return golem_interfaces.EstopFrame(header(frame.t), frame.sequence, frame.pressed)
+
+
+MAP_FRAME = "map"
+"""Frame of the map."""
+
+
+def occupancy_grid(grid: OccupancyGrid) -> nav_msgs.OccupancyGrid:
+    """Return a map in its own frame."""
+    rows, columns = grid.cells.shape
+    origin = pose(grid.in_map.origin.matrix())
+    info = nav_msgs.MapMetaData(time(grid.t), grid.resolution, columns, rows, origin)
+    return nav_msgs.OccupancyGrid(header(grid.t, MAP_FRAME), info, grid.cells.ravel().astype(np.int8))
+
+
+def to_occupancy_grid(message: nav_msgs.OccupancyGrid) -> OccupancyGrid:
+    """Return a map as it was told, in its own frame."""
+    info = message.info
+    cells = np.asarray(message.data, np.int8).reshape(info.height, info.width)
+    return OccupancyGrid(seconds(message.header.stamp), PlanarPose.of(matrix(info.origin)), info.resolution, cells)
+
+
+def path(way: NavPath) -> nav_msgs.Path:
+    """Return a way; each pose heads to the next."""
+    steps = np.diff(way.points, axis=0)
+    headings = [math.atan2(y, x) for x, y in steps.tolist()]
+    headings += headings[-1:] or [0.0]
+    stamp = header(way.t, way.frame)
+    poses = [
+        PoseStamped(stamp, pose(PlanarPose(x, y, yaw).matrix()))
+        for (x, y), yaw in zip(way.points.tolist(), headings, strict=False)
+    ]
+    return nav_msgs.Path(stamp, poses)

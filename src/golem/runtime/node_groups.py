@@ -23,8 +23,8 @@ from golem.interfaces.payloads import GateStatus
 from golem.middleware.bus import Bus
 from golem.robots.base import HasGantry, HasLidar, Robot
 from golem.robots.model.pinocchio_model import Kinematics
-from golem.robots.unitree import motion_switcher
-from golem.robots.unitree.motion_switcher import MotionSwitcher
+from golem.robots.unitree import loco_service
+from golem.robots.unitree.loco_service import MotionSwitcher
 from golem.runtime import nodes, perception_nodes, robot_nodes, safety_nodes
 from golem.runtime.checked import CheckedGraspMethod, CheckedMemory, CheckedNavigator, CheckedPlanner, CheckedProperties
 from golem.runtime.contract_check import ContractCheck
@@ -127,7 +127,7 @@ class RobotNodes:
             loco = LocoServiceNode(bus, stack_loco_api(stack), legs, stack.part("locomotion"))
             self.nodes.append((Phase.SERVE, loco))
         switcher = MotionSwitcher(None if loco is None else loco.service)
-        self.nodes.append((Phase.SERVE, ServiceNode(bus, motion_switcher.SERVICE, switcher.answer)))
+        self.nodes.append((Phase.SERVE, ServiceNode(bus, loco_service.SERVICE, switcher.answer)))
         self.nodes.append((Phase.ACT, self.act))
 
 

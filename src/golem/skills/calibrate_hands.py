@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from golem.capabilities.calibration.hand_fit import OTHER, fit_hand
-from golem.capabilities.calibration.hand_view_postures import hand_view_postures
+from golem.capabilities.calibration.hand_fit import OTHER, fit_hand, hand_view_postures
 from golem.capabilities.calibration.kinematic_fit import ZERO
 from golem.options import require
 from golem.robots.sensors.calibration import Calibration, read_calibration

@@ -7,8 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from golem.capabilities.calibration.hand_fit import OTHER, fit_hand
-from golem.capabilities.calibration.hand_view_postures import SPARE, hand_view_postures
+from golem.capabilities.calibration.hand_fit import OTHER, SPARE, fit_hand, hand_view_postures
 from golem.capabilities.calibration.kinematic_fit import ARM, PIXEL, TagView, pose
 from golem.errors import ConfigError
 from golem.hardware.safety.base import SafetyLimits

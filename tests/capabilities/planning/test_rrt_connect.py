@@ -15,9 +15,8 @@ from golem.capabilities.collision.obstacles import Obstacle, World, cloud_grid
 from golem.capabilities.planning.base import Held, Plan, PlanRefused, PlanRequest, Refusal
 from golem.capabilities.planning.hermite import interpolate
 from golem.capabilities.planning.path_planner import fine_points
-from golem.capabilities.planning.rrt_connect import RrtConnect
+from golem.capabilities.planning.rrt_connect import RrtConnect, Straight
 from golem.capabilities.planning.rules import Balanced, HandBox, HandUpright
-from golem.capabilities.planning.straight import Straight
 from golem.errors import ConfigError
 from golem.types import Array
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from golem.capabilities.planning.base import Plan, PlanRequest
-from golem.capabilities.planning.straight import Straight
+from golem.capabilities.planning.rrt_connect import Straight
 from golem.evaluation.conformance.base import FAILED, Candidate
 from golem.evaluation.conformance.examine import examine
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from golem.evaluation.base import TrialSpec
-from golem.evaluation.report.condition_plot import PARTS, Placed, condition_plot, parts
-from golem.evaluation.report.svg_figure import page_figure, styled
+from golem.evaluation.report.svg_figure import PARTS, Placed, condition_plot, page_figure, parts, styled
 from golem.evaluation.rungs.pick_screw import PickOptions, conditions_of
 from golem.robots.worlds.conditions import CHOICES, RANGES
 

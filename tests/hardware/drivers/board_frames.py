@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from golem.hardware.drivers.estop_frame import BoardFrame
+from golem.hardware.estop.serial_board import BoardFrame
 
 
 def crc16(data: bytes) -> int:

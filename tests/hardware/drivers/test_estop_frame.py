@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.hardware.drivers.board_frames import frame_bytes
 
-from golem.hardware.drivers.estop_frame import SIZE, BoardFrame, FrameParser, checksum
+from golem.hardware.estop.serial_board import SIZE, BoardFrame, FrameParser, checksum
 
 FRAMES = st.lists(st.builds(BoardFrame, st.integers(0, 65535), st.booleans(), st.integers(0, 255)), max_size=20)
 SYNC_FREE = st.binary(max_size=30).map(lambda data: data.replace(b"\xa5", b"\x00"))

@@ -11,11 +11,10 @@ from tests.hardware.drivers.board_frames import frame_bytes
 from tests.hardware.drivers.pty_line import CountingPort, PtyLine
 
 from golem.errors import ConfigError
-from golem.hardware.drivers.estop_frame import BoardFrame
 from golem.hardware.drivers.serial_port import PortError, SerialPort
 from golem.hardware.estop.base import EmergencyStop
 from golem.hardware.estop.estop_config import EstopConfig, VirtualEstop
-from golem.hardware.estop.serial_board import REOPEN, SerialEstop
+from golem.hardware.estop.serial_board import REOPEN, BoardFrame, SerialEstop
 from golem.hardware.safety.base import OperatorRequest
 from golem.interfaces.payloads import EstopMessage, GateState, Reason
 

@@ -30,8 +30,7 @@ from golem.middleware.wire import api, convert, hg
 from golem.middleware.wire.api import ApiRequest, Response
 from golem.middleware.wire.hg import Checksum
 from golem.middleware.wire.struct_layout import WireError
-from golem.robots.unitree.loco_service import LocoService
-from golem.robots.unitree.motion_switcher import CHECK_MODE, RELEASE_MODE, SELECT_MODE, MotionSwitcher
+from golem.robots.unitree.loco_service import CHECK_MODE, RELEASE_MODE, SELECT_MODE, LocoService, MotionSwitcher
 
 WORDS = (b"\0\0\0\0", b"\xff\xff\xff\xff", b"\xff\xff\xff\x7f", b"\0\0\xc0\x7f", b"\0\0\x80\xff", b"\1\0\0\0")
 """Lengths, NaN and infinity as they stand in a payload."""

@@ -4,9 +4,8 @@ import pytest
 
 from golem.interfaces.unitree_api import GET_VERSION, LOCO_APIS, NOT_IMPLEMENTED, OK, decode, encode
 from golem.middleware.wire.api import ApiRequest, Response
-from golem.robots.unitree import motion_switcher
-from golem.robots.unitree.loco_service import LocoService
-from golem.robots.unitree.motion_switcher import CHECK_MODE, RELEASE_MODE, SELECT_MODE, MotionSwitcher
+from golem.robots.unitree import loco_service
+from golem.robots.unitree.loco_service import CHECK_MODE, RELEASE_MODE, SELECT_MODE, LocoService, MotionSwitcher
 
 API = LOCO_APIS["h1"]
 
@@ -41,11 +40,11 @@ def test_a_mode_can_be_selected_again() -> None:
 @pytest.mark.parametrize(
     ("parameter", "code"),
     [
-        ('{"name": "normal"}', motion_switcher.UNKNOWN_MODE),
-        ("{}", motion_switcher.UNKNOWN_MODE),
-        pytest.param(encode({"name": "x" * 1_000_000}), motion_switcher.UNKNOWN_MODE, id="a megabyte"),
-        ("junk", motion_switcher.BAD_PARAMETER),
-        ("[]", motion_switcher.BAD_PARAMETER),
+        ('{"name": "normal"}', loco_service.UNKNOWN_MODE),
+        ("{}", loco_service.UNKNOWN_MODE),
+        pytest.param(encode({"name": "x" * 1_000_000}), loco_service.UNKNOWN_MODE, id="a megabyte"),
+        ("junk", loco_service.BAD_PARAMETER),
+        ("[]", loco_service.BAD_PARAMETER),
     ],
 )
 def test_a_mode_there_is_not_is_refused_and_changes_nothing(parameter: str, code: int) -> None:

@@ -11,8 +11,8 @@ from tests.robots.unitree.conftest import Started
 
 from golem.middleware.dds.base import Qos
 from golem.middleware.wire import convert, hg
-from golem.robots.unitree import motion_switcher
-from golem.robots.unitree.motion_switcher import CHECK_MODE, RELEASE_MODE, MotionSwitcher
+from golem.robots.unitree import loco_service
+from golem.robots.unitree.loco_service import CHECK_MODE, RELEASE_MODE, MotionSwitcher
 from golem.types import NUM_JOINTS, Array, Imu, LowCommand, LowState
 
 EXAMPLE = "h1_2/low_level/h1_2_low_level_example.py"
@@ -45,7 +45,7 @@ class Twin:
         low = Qos(depth=8)
         self._states = self._participant.writer("rt/lowstate", hg.LOW_STATE.type_name, low)
         self._commands = self._participant.reader("rt/lowcmd", hg.LOW_CMD.type_name, low)
-        self._server = serve(self._participant, motion_switcher.SERVICE)
+        self._server = serve(self._participant, loco_service.SERVICE)
         self._switcher = MotionSwitcher()
         self._imu = Imu(np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), np.array([0.0, 0.0, 9.81]))
 

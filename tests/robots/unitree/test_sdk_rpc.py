@@ -13,8 +13,8 @@ from tests.robots.unitree.sdk_rpc import ECHO, FAIL
 from golem.capabilities.legs.hold import JointHold
 from golem.interfaces.unitree_api import LOCO_APIS, NOT_IMPLEMENTED, OK
 from golem.middleware.bus import Bus
-from golem.robots.unitree import motion_switcher
-from golem.robots.unitree.motion_switcher import UNKNOWN_MODE, MotionSwitcher
+from golem.robots.unitree import loco_service
+from golem.robots.unitree.loco_service import UNKNOWN_MODE, MotionSwitcher
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.executor import Executor
 from golem.runtime.live.onboard_bridge import AnswersOut, CallsIn
@@ -34,8 +34,8 @@ def test_the_vendors_clients_are_answered(sdk: Started, domain: int) -> None:
     participant, bus = connect(DdsConfig(domain)), Bus()
     try:
         loco = LocoServiceNode(bus, API, CheckedLowerBody(JointHold(), ContractCheck("lower_body", "hold")))
-        switcher = ServiceNode(bus, motion_switcher.SERVICE, MotionSwitcher(loco.service).answer)
-        servers = {name: serve(participant, name) for name in (API.service, motion_switcher.SERVICE)}
+        switcher = ServiceNode(bus, loco_service.SERVICE, MotionSwitcher(loco.service).answer)
+        servers = {name: serve(participant, name) for name in (API.service, loco_service.SERVICE)}
         calls = [CallsIn(bus, name, server) for name, server in servers.items()]
         answers = [AnswersOut(bus, name, server) for name, server in servers.items()]
         executor = Executor(bus, [*calls, loco, switcher, *answers])

@@ -14,8 +14,8 @@ from golem.middleware.dds.local import LocalDomain
 from golem.middleware.ros.node import RosNode
 from golem.middleware.wire import hg
 from golem.middleware.wire.api import ApiRequest, Response
-from golem.robots.unitree import motion_switcher
-from golem.robots.unitree.motion_switcher import CHECK_MODE, MotionSwitcher
+from golem.robots.unitree import loco_service
+from golem.robots.unitree.loco_service import CHECK_MODE, MotionSwitcher
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.executor import Executor
 from golem.runtime.live.bridge import StreamIn, StreamOut
@@ -32,8 +32,8 @@ def robot(domain: LocalDomain) -> Executor:
     """The robot's side: both services, behind the domain."""
     bus, participant = Bus(), domain.participant()
     loco = LocoServiceNode(bus, API, CheckedLowerBody(JointHold(), ContractCheck("lower_body", "hold")))
-    switcher = ServiceNode(bus, motion_switcher.SERVICE, MotionSwitcher(loco.service).answer)
-    servers = {name: serve(participant, name) for name in (API.service, motion_switcher.SERVICE)}
+    switcher = ServiceNode(bus, loco_service.SERVICE, MotionSwitcher(loco.service).answer)
+    servers = {name: serve(participant, name) for name in (API.service, loco_service.SERVICE)}
     calls = [CallsIn(bus, name, server) for name, server in servers.items()]
     answers = [AnswersOut(bus, name, server) for name, server in servers.items()]
     return Executor(bus, [*calls, loco, switcher, *answers])
@@ -97,7 +97,7 @@ def test_stations_that_count_alike_do_not_get_each_others_answers() -> None:
 
 def test_calls_that_come_together_are_all_answered_and_none_that_wants_no_answer() -> None:
     domain = LocalDomain()
-    twin, client = robot(domain), reach(domain.participant(), motion_switcher.SERVICE)
+    twin, client = robot(domain), reach(domain.participant(), loco_service.SERVICE)
     for number in range(20):
         client.send(ApiRequest(number, CHECK_MODE, noreply=number % 4 == 0))
     run(twin, ticks=30)

@@ -18,7 +18,7 @@ from golem.middleware.ros.msgs.std_srvs import Trigger_Request
 from golem.middleware.wire import convert as wire
 from golem.middleware.wire import hg
 from golem.middleware.wire.api import ApiRequest, RpcServer
-from golem.robots.unitree import motion_switcher
+from golem.robots.unitree import loco_service
 from golem.runtime.live import motion_switcher_client
 from golem.runtime.live.safety_arrivals import Arrivals
 from golem.runtime.live.safety_main import SafetyConfig, run_safety
@@ -35,7 +35,7 @@ def let_go(live: Live) -> None:
     """Replace the gate by one for a real robot whose own controller has let go of the motors."""
     live.leave("safety")
     live.start_gate(real=True)
-    reach(live.member("hand")[0], motion_switcher.SERVICE).send(ApiRequest(1, motion_switcher.RELEASE_MODE))
+    reach(live.member("hand")[0], loco_service.SERVICE).send(ApiRequest(1, loco_service.RELEASE_MODE))
     live.run(1.5)
 
 
@@ -50,13 +50,13 @@ def test_a_real_robots_motors_are_not_touched_before_its_own_controller_lets_go_
     assert "'ai'" in live.gate.status.detail and "golem safety take --hanging" in live.gate.status.detail
     assert not live.ask("activate")[0]
 
-    switcher = reach(participant, motion_switcher.SERVICE)
-    switcher.send(ApiRequest(1, motion_switcher.RELEASE_MODE))
+    switcher = reach(participant, loco_service.SERVICE)
+    switcher.send(ApiRequest(1, loco_service.RELEASE_MODE))
     live.run(1.0)
     assert live.state is GateState.ARMED and motors.take(1000)
     live.activate()
 
-    switcher.send(ApiRequest(2, motion_switcher.SELECT_MODE, encode({"name": motion_switcher.MODE})))
+    switcher.send(ApiRequest(2, loco_service.SELECT_MODE, encode({"name": loco_service.MODE})))
     live.run(1.0)
     assert (live.state, live.reason) == (GateState.STOP1, "motors_held")
     *stiff, last = [wire.decode_low_command(sample.payload, 0.0) for sample in motors.take(1000)]
@@ -72,7 +72,7 @@ def test_a_motion_switcher_that_falls_silent_keeps_the_gate_shut_but_stops_nobod
     live.leave("safety")
     live.start_gate(real=True)
     participant, _ = live.member("operator")
-    reach(participant, motion_switcher.SERVICE).send(ApiRequest(1, motion_switcher.RELEASE_MODE))
+    reach(participant, loco_service.SERVICE).send(ApiRequest(1, loco_service.RELEASE_MODE))
     live.run(1.0)
     live.activate()
     monkeypatch.setattr(RpcServer, "reply", lambda server, response: None)

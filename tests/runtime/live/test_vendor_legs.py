@@ -11,7 +11,7 @@ from golem.capabilities.legs.hold import STANCES
 from golem.interfaces import topics
 from golem.interfaces.payloads import GateState, LegStatus
 from golem.middleware.wire.api import ApiRequest
-from golem.robots.unitree.motion_switcher import RELEASE_MODE, SERVICE
+from golem.robots.unitree.loco_service import RELEASE_MODE, SERVICE
 from golem.stack import Choice
 from golem.types import LEGS
 

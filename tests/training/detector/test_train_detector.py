@@ -16,9 +16,8 @@ torch = pytest.importorskip("torch", reason="training needs the extra 'train'")
 from golem.capabilities.perception.onnx_detector import OnnxDetector, OnnxDetectorConfig  # noqa: E402
 from golem.training.detector.dataset import Dataset  # noqa: E402
 from golem.training.detector.evaluate import draw_curve  # noqa: E402
-from golem.training.detector.export_detector import export_onnx  # noqa: E402
 from golem.training.detector.labels import CLASSES  # noqa: E402
-from golem.training.detector.part_net import PartNet  # noqa: E402
+from golem.training.detector.part_net import PartNet, export_onnx  # noqa: E402
 from golem.training.detector.train_detector import (  # noqa: E402
     TrainDetectorConfig,
     load_onnx,  # noqa: E402

@@ -6,18 +6,21 @@ still off by is found with it, so far as the views tell, and counts in the covar
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from golem.capabilities.arms.postures import posture
+from golem.capabilities.calibration import view_postures
 from golem.capabilities.calibration.kinematic_fit import ARM, CUFF, VIEWS, TagView, ViewProblem, pose, solve
 from golem.errors import ConfigError
+from golem.hardware.safety.base import SafetyLimits
 from golem.robots.model.magpie_model import T_HAND_CAMERA, hand_name
 from golem.robots.model.pinocchio_model import Kinematics
 from golem.robots.model.tag_cuff import cuff_tags, tag_corners
 from golem.robots.sensors.calibration import Calibration
 from golem.robots.sensors.cameras import CAMERAS, project
-from golem.types import SIDES, Array, CameraInfo, Side
+from golem.types import SIDES, UPPER, Array, CameraInfo, Side
 
 MOUNT = (0.02, 0.005)
 """Prior of a palm camera's mount, rotation [rad] and translation [m]."""
@@ -89,3 +92,62 @@ class _HandProblem(ViewProblem):
                 points = (T @ self._tags[number] @ self._corners.T).T[:, :3]
                 errors.append((project(self._info, points) - seen).ravel())
         return np.concatenate(errors)
+
+
+MARGIN = 35.0
+"""How far inside the image the tag's middle has to be [px]."""
+RANGE = (0.15, 0.38)
+"""Distances of the tag from the camera [m]."""
+SPARE = 0.05
+"""Distance kept from the ends of the joints' ranges [rad]."""
+
+
+def hand_view_postures(
+    camera: Side,
+    count: int,
+    free: Callable[[Array], bool],
+    spheres: Callable[[Array], Array],
+    zero: float,
+    seed: int = 0,
+) -> list[Array]:
+    """Return up to `count` postures (15,) of torso and arms that tell the most of the mount together.
+
+    Args:
+        camera: the side whose palm camera looks at the other hand.
+        count: how many.
+        free: says of a posture whether it may be gone to.
+        spheres: returns the (m, 4) spheres of the robot in a posture, centres in base_link and radii [m].
+        zero: standard deviation of the arms' zeros [rad].
+        seed: of the draws.
+    """
+    rng, limits = np.random.default_rng(seed), SafetyLimits.from_profile()
+    lower, upper = limits.lower[UPPER] + SPARE, limits.upper[UPPER] - SPARE
+    T_base_torso = Kinematics().pose("torso_link")
+    found: list[tuple[Array, list[int]]] = []
+    for _ in range(view_postures.DRAWS // view_postures.BATCH * len(SIDES)):
+        Q = np.zeros((view_postures.BATCH, len(lower)))
+        for side in SIDES:
+            part = view_postures.ARM[side]
+            drawn = posture(f"ready_{side}")[part] + view_postures.SPREAD * rng.uniform(
+                -1.0, 1.0, (view_postures.BATCH, 7)
+            )
+            Q[:, part] = np.clip(drawn, lower[part], upper[part])
+        eyes = T_base_torso @ view_postures.hand_poses(camera, Q[:, view_postures.ARM[camera]]) @ T_HAND_CAMERA
+        hands = T_base_torso @ view_postures.hand_poses(OTHER[camera], Q[:, view_postures.ARM[OTHER[camera]]])
+        inverse = np.linalg.inv(eyes)
+        poses = {n: inverse @ hands @ T for n, T in cuff_tags(OTHER[camera]).items()}
+        seen = {n: view_postures.visible(CAMERAS[f"{camera}_hand"], T, MARGIN, RANGE) for n, T in poses.items()}
+        for i in np.flatnonzero(np.any(list(seen.values()), axis=0)):
+            if not free(Q[i]):
+                continue
+            around = spheres(Q[i])
+            tags = [
+                n
+                for n, T in cuff_tags(OTHER[camera]).items()
+                if seen[n][i] and not view_postures.hidden(eyes[i][:3, 3], (hands[i] @ T)[:3, 3], around)
+            ]
+            if tags:
+                found.append((Q[i], tags))
+        if len(found) >= view_postures.CANDIDATES:
+            break
+    return view_postures.telling(found, lambda q, tags: hand_information(camera, q, tags, zero), count)

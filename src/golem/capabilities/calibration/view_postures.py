@@ -14,7 +14,7 @@ from golem.robots.model.pinocchio_model import Kinematics
 from golem.robots.model.table import JOINTS, T_TORSO_HEAD_OPTICAL
 from golem.robots.model.tag_cuff import cuff_tags
 from golem.robots.sensors.cameras import HEAD, project
-from golem.types import NUM_JOINTS, UPPER, Array, Side
+from golem.types import NUM_JOINTS, UPPER, Array, CameraInfo, Side
 
 SPREAD = np.array([1.8, 1.2, 2.0, 1.5, 2.6, 1.0, 1.0])
 """How far each joint of the arm goes from where it is ready [rad]."""
@@ -60,27 +60,24 @@ def view_postures(
     for _ in range(DRAWS // BATCH):
         Q = ready[ARM[side]] + SPREAD * rng.uniform(-1.0, 1.0, (BATCH, 7))
         hands = hand_poses(side, Q)
-        seen = seen_tags(side, hands)
+        tags = {n: np.linalg.inv(T_TORSO_HEAD_OPTICAL) @ hands @ T for n, T in cuff_tags(side).items()}
+        seen = {n: visible(HEAD, poses, MARGIN, RANGE) for n, poses in tags.items()}
         high = (T_base_torso @ hands @ T_HAND_GRIPPER)[:, 2, 3] >= LOWEST
         for i in np.flatnonzero(high & np.any(list(seen.values()), axis=0)):
             q = ready.copy()
             q[ARM[side]] = Q[i]
             if not free(q):
                 continue
-            tags = [
+            shown = [
                 n
                 for n, T in cuff_tags(side).items()
                 if seen[n][i] and not hidden(eye, (T_base_torso @ hands[i] @ T)[:3, 3], spheres(q))
             ]
-            if tags:
-                found.append((q, tags))
+            if shown:
+                found.append((q, shown))
         if len(found) >= CANDIDATES:
             break
-    joints, told = np.zeros(NUM_JOINTS), list[Array]()
-    for q, tags in found[:CANDIDATES]:
-        joints[UPPER] = q
-        told.append(information(side, joints, tags))
-    return [found[i][0] for i in telling(told, count)]
+    return telling(found, lambda q, tags: information(side, q, tags), count)
 
 
 def hand_poses(side: Side, Q: Array) -> Array:
@@ -97,20 +94,21 @@ def hand_poses(side: Side, Q: Array) -> Array:
     return T @ T_WRIST_HAND
 
 
-def seen_tags(side: Side, hands: Array) -> dict[int, NDArray[np.bool_]]:
-    """Return (n,) for each tag whether the camera sees it if nothing hides it, for poses (n, 4, 4) in the torso."""
-    T_optical_torso = np.linalg.inv(T_TORSO_HEAD_OPTICAL)
-    out: dict[int, NDArray[np.bool_]] = {}
-    for number, T in cuff_tags(side).items():
-        tag = T_optical_torso @ hands @ T
-        p = tag[:, :3, 3]
-        distance = np.linalg.norm(p, axis=1)
-        ahead = np.maximum(p, (-np.inf, -np.inf, 1e-3))
-        u, v = project(HEAD, ahead).T
-        good = (p[:, 2] > 0.0) & (distance >= RANGE[0]) & (distance <= RANGE[1])
-        good &= (u >= MARGIN) & (u <= HEAD.width - MARGIN) & (v >= MARGIN) & (v <= HEAD.height - MARGIN)
-        out[number] = good & (np.einsum("ij,ij->i", tag[:, :3, 2], p) >= STEEPEST * distance)
-    return out
+def visible(info: CameraInfo, tags: Array, margin: float, distances: tuple[float, float]) -> NDArray[np.bool_]:
+    """Return (n,) whether a camera sees a tag at each of its poses if nothing hides it.
+
+    Args:
+        info: of the camera.
+        tags: (n, 4, 4) poses of the tag in the optical frame.
+        margin: how far inside the image its middle has to be [px].
+        distances: least and greatest [m].
+    """
+    p = tags[:, :3, 3]
+    distance = np.linalg.norm(p, axis=1)
+    u, v = project(info, np.maximum(p, (-np.inf, -np.inf, 1e-3))).T
+    good = (p[:, 2] > 0.0) & (distance >= distances[0]) & (distance <= distances[1])
+    good &= (u >= margin) & (u <= info.width - margin) & (v >= margin) & (v <= info.height - margin)
+    return good & (np.einsum("ij,ij->i", tags[:, :3, 2], p) >= STEEPEST * distance)
 
 
 def hidden(eye: Array, tag: Array, spheres: Array) -> bool:
@@ -124,15 +122,22 @@ def hidden(eye: Array, tag: Array, spheres: Array) -> bool:
     return bool((between & (beside < spheres[:, 3] + CLEARANCE)).any())
 
 
-def telling(told: list[Array], count: int) -> list[int]:
-    """Return which views tell the most together: each next one adds most to the determinant of information.
+def telling(
+    found: list[tuple[Array, list[int]]], information: Callable[[Array, list[int]], Array], count: int
+) -> list[Array]:
+    """Return the postures that tell the most together: each next one adds most to the determinant of information.
 
     Args:
-        told: information of each view, (n, n), in units of the priors.
+        found: postures (15,) and the tags that are seen in them; the first `CANDIDATES` are compared.
+        information: of a view with joints (27,) and tags, (n, n), in units of the priors.
         count: how many are chosen at most.
     """
-    if not told:
+    if not found:
         return []
+    joints, told = np.zeros(NUM_JOINTS), list[Array]()
+    for q, tags in found[:CANDIDATES]:
+        joints[UPPER] = q
+        told.append(information(joints, tags))
     views = np.array(told)
     total = np.eye(views.shape[1])
     chosen: list[int] = []
@@ -141,4 +146,4 @@ def telling(told: list[Array], count: int) -> list[int]:
         gain[chosen] = -np.inf
         chosen.append(int(np.argmax(gain)))
         total = total + views[chosen[-1]]
-    return chosen
+    return [found[i][0] for i in chosen]

@@ -6,9 +6,8 @@ from collections.abc import Mapping, Sequence
 
 from golem.evaluation.base import Case
 from golem.evaluation.harness.records import TrialRecord
-from golem.evaluation.metrics.metric_names import METRICS, Metric, metric
 from golem.evaluation.metrics.statistics import Distribution, Interval
-from golem.evaluation.metrics.summary import NO_MODULE, MethodSummary, PairedMean, Summary
+from golem.evaluation.metrics.summary import METRICS, NO_MODULE, MethodSummary, Metric, PairedMean, Summary, metric
 from golem.evaluation.metrics.text_table import TextTable, short_names
 
 SECONDS = Metric("", "s")

@@ -30,7 +30,7 @@ from golem.evaluation.episodes.pick_claims import REFUSALS, Fastener, claims
 from golem.evaluation.episodes.pick_watch import PickTouches, PickWatch
 from golem.evaluation.harness.arguments import read_sweep
 from golem.evaluation.metrics.text_table import TextTable
-from golem.evaluation.report.condition_plot import condition_plot
+from golem.evaluation.report.svg_figure import condition_plot
 from golem.provenance import stack_facts
 from golem.robots.mujoco.balance import TRACE, BalanceRecorder, BalanceTrace
 from golem.robots.mujoco.engine import MujocoRobot

@@ -24,9 +24,8 @@ from golem.capabilities.planning.base import ArmPlanner, Held, Plan, PlanRefused
 from golem.capabilities.planning.hermite import interpolate
 from golem.capabilities.planning.joint_space import JointSpace, PlanningRobot
 from golem.capabilities.planning.path_planner import fine_points
-from golem.capabilities.planning.rrt_connect import RrtConnect
+from golem.capabilities.planning.rrt_connect import RrtConnect, Straight
 from golem.capabilities.planning.rules import HandUpright, Rule
-from golem.capabilities.planning.straight import Straight
 from golem.errors import ConfigError
 from golem.evaluation.metrics.statistics import wilson
 from golem.evaluation.speed.bench import BenchOutput, Figure, figure, print_figures, timed

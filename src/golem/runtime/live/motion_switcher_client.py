@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from golem.interfaces.unitree_api import OK, decode
 from golem.middleware.wire.api import ApiRequest, RpcClient, request_topic, response_topic
-from golem.robots.unitree.motion_switcher import CHECK_MODE, RELEASE_MODE, SERVICE
+from golem.robots.unitree.loco_service import CHECK_MODE, RELEASE_MODE, SERVICE
 from golem.runtime.live.clock import Every
 from golem.runtime.live.onboard_bridge import Identities
 from golem.runtime.live.role_endpoints import RoleEndpoints

@@ -15,8 +15,8 @@ from golem.capabilities.arms.hand_force import ContactSense, HandForce
 from golem.interfaces import images, public, topics
 from golem.interfaces import ros_convert as convert
 from golem.interfaces.images import Lens, Pairing, to_lens
-from golem.interfaces.nav_convert import MAP_FRAME
 from golem.interfaces.payloads import Exposure, GateState, GateStatus, HandGoal
+from golem.interfaces.ros_convert import MAP_FRAME
 from golem.middleware.bus import Bus, Topic
 from golem.middleware.ros.future import Future
 from golem.middleware.ros.msgs import golem_interfaces, sensor_msgs

@@ -18,7 +18,7 @@ from golem.middleware.wire.api import RpcServer, request_topic, response_topic
 from golem.middleware.wire.convert import answered, decode_low_command
 from golem.middleware.wire.struct_layout import WireError
 from golem.robots.base import HasGantry, Robot
-from golem.robots.unitree import motion_switcher
+from golem.robots.unitree import loco_service
 from golem.runtime import nodes
 from golem.runtime.executor import Executor, Phase, Placed, in_order
 from golem.runtime.live.bridge import RejectedMessages, incoming, outgoing
@@ -157,7 +157,7 @@ class Twin:
             *side.nodes,
             *outgoing(bus, endpoints, encoders(bus)),
         ]
-        for service in (motion_switcher.SERVICE, stack_loco_api(stack).service):
+        for service in (loco_service.SERVICE, stack_loco_api(stack).service):
             requests, responses = request_topic(service), response_topic(service)
             server = RpcServer(endpoints.reader(f"/{requests}"), endpoints.writer(f"/{responses}"))
             placed.append((Phase.RECEIVE, CallsIn(bus, service, server)))

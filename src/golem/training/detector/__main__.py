@@ -154,7 +154,7 @@ def export(checkpoint: Path = RUNS / "run" / "best.pt", out: Path = RUNS / "dete
         checkpoint: of `train`.
         out: the ONNX file.
     """
-    from golem.training.detector.export_detector import export_onnx
+    from golem.training.detector.part_net import export_onnx
 
     print(export_onnx(checkpoint, out))
 
@@ -229,7 +229,7 @@ def own(
     """
     from golem.capabilities.perception.onnx_detector import SHIPPED, OnnxDetector, OnnxDetectorConfig
     from golem.training.detector.evaluate import THRESHOLD, evaluate, table
-    from golem.training.detector.export_detector import export_onnx
+    from golem.training.detector.part_net import export_onnx
     from golem.training.detector.train_detector import fit
 
     if steps < 1 or width < 64 or seed < 0:
