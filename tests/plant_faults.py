@@ -51,7 +51,7 @@ FAULTS = {
         ("tests/hardware/safety/test_monitor.py", "tests/hardware/safety/test_kernel.py"),
     ),
     "estimator-turns-backwards": PlantedFault(
-        "hardware/estimator/random_walk.py",
+        "hardware/estimator/random_walk_kf.py",
         "return -(turning + rates) @ R.swapaxes(-1, -2)",
         "return -(rates - turning) @ R.swapaxes(-1, -2)",
         ("tests/hardware/estimator/test_random_walk.py", "tests/hardware/estimator/test_base_estimators.py"),
