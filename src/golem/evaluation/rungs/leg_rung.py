@@ -42,6 +42,7 @@ class LegRung(Rung[O]):
     Attributes:
         twin: further options of the twin that the rung asks for.
         walks: whether a lower body has to walk.
+        facts: what determines a trial besides its stack and its seed.
     """
 
     Options = PlantOptions
@@ -49,6 +50,7 @@ class LegRung(Rung[O]):
     slot = "lower_body"
     twin: Mapping[str, object] = {}
     walks: bool = False
+    facts: Mapping[str, object] = {}
 
     def _each(self, *options: str) -> None:
         """Check options that name several things.
@@ -63,7 +65,7 @@ class LegRung(Rung[O]):
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
         """Return what determines a trial besides its seed; see `Rung`."""
-        return stack_facts(self.stack(method, profile, overrides))
+        return {**stack_facts(self.stack(method, profile, overrides)), **self.facts}
 
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
         """Run one trial; see `Rung`."""

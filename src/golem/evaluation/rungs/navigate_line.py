@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -52,11 +50,7 @@ class NavigateLine(LegRung[LineOptions]):
 
     name = "navigate-line"
     Options = LineOptions
-
-    def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
-        """Return what determines a trial besides its seed; see `Rung`."""
-        facts = super().config(method, profile, overrides)
-        return {**facts, "distance": DISTANCE, "tolerance": TOLERANCE}
+    facts = {"distance": DISTANCE, "tolerance": TOLERANCE}
 
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
         """Run one trial; see `Rung`."""

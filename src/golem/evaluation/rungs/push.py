@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -43,11 +42,7 @@ class PushRung(LegRung[PlantOptions]):
 
     name = "push"
     provokes = True
-
-    def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
-        """Return what determines a trial besides its seed; see `Rung`."""
-        facts = super().config(method, profile, overrides)
-        return {**facts, "peak": PEAK, "settle": SETTLE, "patience": PATIENCE}
+    facts: Mapping[str, object] = {"peak": PEAK, "settle": SETTLE, "patience": PATIENCE}
 
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
         """Run one trial; see `Rung`."""
@@ -139,10 +134,7 @@ class PushRampRung(PushRung):
     """
 
     name = "push-ramp"
-
-    def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
-        """Return what determines a trial besides its seed; see `Rung`."""
-        return {**super().config(method, profile, overrides), "peak": (MAX_FORCE, RATE)}
+    facts = {**PushRung.facts, "peak": (MAX_FORCE, RATE)}
 
     def draw(self, rng: np.random.Generator) -> tuple[Push, float]:
         """Return the push of one trial, and the time before it [s]."""
