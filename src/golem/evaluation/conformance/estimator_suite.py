@@ -23,10 +23,7 @@ class EstimatorSuite(Suite):
     """Inputs are states, answers estimates."""
 
     slot, contracts = "estimator", (BaseEstimator,)
-
-    def allowed(self, module: BaseEstimator) -> float:
-        """Return the period of the estimator [s]."""
-        return TICK
+    takes = TICK
 
     def inputs(self) -> Sequence[LowState]:
         """Return a robot that stands and sways."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -61,14 +61,7 @@ class GraspSuite(Suite):
     """Inputs are objects, answers proposals with what the servo law of the first says."""
 
     slot, contracts, forgets = "grasp_method", (GraspMethod,), False
-
-    def declared(self, contract: ContractCheck, module: Any) -> None:
-        """Check the latency."""
-        contract.number("latency", module.latency, minimum=0.0)
-
-    def allowed(self, module: GraspMethod) -> float:
-        """Return its latency, and the time that needs no declaration [s]."""
-        return module.latency + ALLOWED
+    late, takes = True, ALLOWED
 
     def inputs(self) -> Sequence[GraspInput]:
         """Return objects within reach."""

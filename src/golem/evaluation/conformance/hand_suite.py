@@ -39,14 +39,11 @@ class HandSuite(Suite):
     """Inputs are reports and requests, answers commands with the status."""
 
     slot, contracts, forgets = "hand", (HandController,), False
+    takes = PERIOD
 
     def context(self) -> Mapping[str, object]:
         """Return which hand it is."""
         return {"side": "right"}
-
-    def allowed(self, module: HandController) -> float:
-        """Return its period [s]."""
-        return PERIOD
 
     def inputs(self) -> Sequence[HandInput]:
         """Return a hand that opens, closes on a part, holds it, and lets it go."""

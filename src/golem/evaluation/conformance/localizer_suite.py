@@ -41,10 +41,7 @@ class LocalizerSuite(Suite):
     """Inputs are frames with labels, answers lists of objects."""
 
     slot, contracts, forgets = "localizer", (Localizer,), False
-
-    def declared(self, contract: ContractCheck, module: Any) -> None:
-        """Check the latency."""
-        contract.number("latency", module.latency, minimum=0.0)
+    late = True
 
     def allowed(self, module: Localizer) -> float:
         """Return its latency [s]."""

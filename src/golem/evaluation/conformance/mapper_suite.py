@@ -40,14 +40,11 @@ class MapperSuite(Suite):
     """Inputs are scans of an empty room, answers the map after each."""
 
     slot, contracts = "mapper", (Mapper,)
+    takes = TENTH
 
     def declared(self, contract: ContractCheck, module: Any) -> None:
         """Check its rate."""
         contract.number("rate", module.rate, minimum=0.1)
-
-    def allowed(self, module: Any) -> float:
-        """Return the time of one input [s]."""
-        return TENTH
 
     def inputs(self) -> Sequence[Scan]:
         """Return scans from the middle of a room."""

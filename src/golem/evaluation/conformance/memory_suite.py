@@ -43,16 +43,13 @@ class MemorySuite(Suite):
     """Inputs are looks, answers what is remembered of both things then, for every time that can be asked for."""
 
     slot, contracts, forgets = "memory", (Memory,), False
+    takes = ALLOWED
 
     def declared(self, contract: ContractCheck, module: Any) -> None:
         """Check that it has seen nothing yet."""
         last = contract.kind("last", module.last, float)
         if last != -math.inf:
             raise contract.fault(f"last is {last} before the first look, the contract asks for -inf")
-
-    def allowed(self, module: Memory) -> float:
-        """Return the time of a look and a question [s]."""
-        return ALLOWED
 
     def inputs(self) -> Sequence[Observation]:
         """Return looks at two things in turn, far from each other."""

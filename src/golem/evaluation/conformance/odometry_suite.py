@@ -36,15 +36,12 @@ class OdometrySuite(Suite):
     """Inputs are what is said in a tenth of a second, answers where the robot is at its end, or nothing."""
 
     slot, contracts = "odometry", (LidarOdometry,)
+    takes = TENTH
 
     def declared(self, contract: ContractCheck, module: Any) -> None:
         """Check what it goes by."""
         if not module.sources or set(module.sources) - set(SOURCES):
             raise contract.fault(f"sources is {module.sources!r}; it names some of {', '.join(SOURCES)}")
-
-    def allowed(self, module: Any) -> float:
-        """Return the time of one input [s]."""
-        return TENTH
 
     def inputs(self) -> Sequence[Tenth]:
         """Return a robot that stands and sets out."""

@@ -33,14 +33,7 @@ class PlannerSuite(Suite):
     """Inputs are requests, answers plans, or the refusal."""
 
     slot, contracts, forgets = "planner", (ArmPlanner,), False
-
-    def declared(self, contract: ContractCheck, module: Any) -> None:
-        """Check the latency."""
-        contract.number("latency", module.latency, minimum=0.0)
-
-    def allowed(self, module: ArmPlanner) -> float:
-        """Return its latency, and the time that needs no declaration [s]."""
-        return module.latency + ALLOWED
+    late, takes = True, ALLOWED
 
     def inputs(self) -> Sequence[PlanRequest]:
         """Return ways between named postures, before a pack."""

@@ -20,10 +20,7 @@ class PropertySuite(Suite):
     """Inputs are names, answers properties, or that the name is none it knows."""
 
     slot, contracts, forgets = "properties", (PropertySource,), False
-
-    def declared(self, contract: ContractCheck, module: Any) -> None:
-        """Check the latency."""
-        contract.number("latency", module.latency, minimum=0.0)
+    late = True
 
     def allowed(self, module: PropertySource) -> float:
         """Return its latency [s]."""

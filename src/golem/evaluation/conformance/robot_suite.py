@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, NamedTuple
@@ -54,10 +53,6 @@ class RobotSuite(RobotMeasures, Suite):
     def context(self) -> Mapping[str, object]:
         """Return the episode."""
         return {"profile": "ideal", "seed": 0, "posture": start_posture()}
-
-    def allowed(self, module: Robot) -> float:
-        """Return infinity: a simulator takes what it takes."""
-        return math.inf
 
     def declared(self, contract: ContractCheck, module: Any) -> None:
         """Check cameras and calibration."""

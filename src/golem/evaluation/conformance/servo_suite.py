@@ -32,10 +32,7 @@ class ServoSuite(Suite):
     """Inputs are states with targets, answers commands to the motors."""
 
     slot, contracts = "servo", (MotorServo,)
-
-    def allowed(self, module: MotorServo) -> float:
-        """Return its period [s]."""
-        return TICK
+    takes = TICK
 
     def inputs(self) -> Sequence[ServoInput]:
         """Return a robot in the hoist whose targets are a little ahead of its joints."""

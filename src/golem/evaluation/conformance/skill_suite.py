@@ -45,10 +45,6 @@ class SkillSuite(Suite):
 
     slot, contracts, forgets = "skill", (Routine, Skill), False
 
-    def allowed(self, module: Any) -> float:
-        """Return infinity: a skill declares no time per tick."""
-        return math.inf
-
     def inputs(self) -> Sequence[None]:
         """Return one goal: the default one, or one of simple values."""
         return [None]

@@ -69,12 +69,16 @@ class Suite:
         contracts: protocols that a module must have the members of.
         forgets: whether `begin` makes a module start over; else it is made anew where that matters.
         refuses_nan: whether NaN among its inputs must not come out of it again.
+        late: whether its modules declare a latency.
+        takes: time that a call may take beside that latency [s]; infinite where none is declared.
     """
 
     slot: str
     contracts: tuple[type[Any], ...]
     forgets = True
     refuses_nan = True
+    late = False
+    takes = math.inf
 
     def context(self) -> Mapping[str, object]:
         """Return what a stack hands to the constructor."""
@@ -82,10 +86,12 @@ class Suite:
 
     def declared(self, contract: ContractCheck, module: Any) -> None:
         """Check the numbers that `module` declares; raises `ModuleFault`."""
+        if self.late:
+            contract.number("latency", module.latency, minimum=0.0)
 
     def allowed(self, module: Any) -> float:
         """Return the time that a call may take [s]; infinite where none is declared."""
-        raise NotImplementedError
+        return self.takes + (module.latency if self.late else 0.0)
 
     def inputs(self) -> Sequence[Any]:
         """Return ordinary inputs, in the order in which a robot would give them."""
