@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from golem.interfaces import images, lidar_convert, ros_convert, topics
+from golem.interfaces import images, lidar_convert, topics
 from golem.interfaces import ros_convert as convert
 from golem.interfaces.payloads import ArmSdkCommand, Exposure, LegCommand
 from golem.interfaces.rows import ActionRow, Role, ServiceRow, TopicRow
@@ -250,10 +250,10 @@ TOPICS: tuple[TopicRow, ...] = (
           topics.LOW_CMD_REQUEST),
     TopicRow("/safety/status", "golem_interfaces/msg/SafetyStatus", "safety", ("stack",), LATCHED, 20, "",
           "State of the gate, and why; at every change, and regularly.",
-          topics.SAFETY, ros_convert.gate_status, ros_convert.to_gate_status),
+          topics.SAFETY, convert.gate_status, convert.to_gate_status),
     TopicRow("/estop", "golem_interfaces/msg/EstopFrame", "safety", (), SENSOR, 100, "",
           "Frames of the emergency stop as the gate sees them.",
-          topics.ESTOP, ros_convert.estop_frame, on_demand=True),
+          topics.ESTOP, convert.estop_frame, on_demand=True),
     TopicRow("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", "safety", (), DEFAULT, 1, "",
           "State of the gate, ages of what it watches, rate of its loop."),
     TopicRow("/base_estimate", "golem_interfaces/msg/BaseEstimate", "stack", ("safety",), LOW, 500, "odom",
@@ -263,12 +263,12 @@ TOPICS: tuple[TopicRow, ...] = (
     TopicRow("/odom", "nav_msgs/msg/Odometry", "stack", (), DEFAULT, 50, "odom",
           "Pose of base_link in odom and its velocity in base_link.",
           topics.BASE, on_demand=True, thinned=True),
-    TopicRow("/map", "nav_msgs/msg/OccupancyGrid", "stack", (), LATCHED, None, ros_convert.MAP_FRAME,
+    TopicRow("/map", "nav_msgs/msg/OccupancyGrid", "stack", (), LATCHED, None, convert.MAP_FRAME,
           "The map of the floor twice a second, where the stack listens to the LiDAR.",
-          topics.MAP, ros_convert.occupancy_grid, ros_convert.to_occupancy_grid, on_demand=True),
-    TopicRow("/plan", "nav_msgs/msg/Path", "stack", (), DEFAULT, None, ros_convert.MAP_FRAME,
+          topics.MAP, convert.occupancy_grid, convert.to_occupancy_grid, on_demand=True),
+    TopicRow("/plan", "nav_msgs/msg/Path", "stack", (), DEFAULT, None, convert.MAP_FRAME,
           "The way that the navigator means to go.",
-          topics.NAV_PATH, ros_convert.path, on_demand=True),
+          topics.NAV_PATH, convert.path, on_demand=True),
     TopicRow("/Odometry", "nav_msgs/msg/Odometry", "user", ("stack",), DEFAULT, None, "",
           "An odometry from outside, as FAST-LIO names it; `odometry: {use: topic}` goes by it.",
           topics.EXTERNAL_ODOMETRY, lidar_convert.odometry, lidar_convert.to_odometry),

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from golem.interfaces import public
-from golem.middleware.bags.base import BagTopic
-from golem.middleware.bags.catalog import topic
 from golem.middleware.bus import Topic
 from golem.middleware.dds.base import Payload, Qos
 from golem.middleware.ros import codec
@@ -101,17 +98,3 @@ class ActionRow:
     type: str
     by: Role
     text: str
-
-
-COMPRESSED = "sensor_msgs/msg/CompressedImage"
-
-
-def public_topics(chosen: Collection[str] = ()) -> list[BagTopic]:
-    """Return the public topics among `chosen`; default: all, but images in one form only: as they are.
-
-    Raises:
-        MissingExtra: as for `topic`.
-    """
-    rows = {row.name: row for row in public.TOPICS}
-    wanted = chosen or [name for name, row in rows.items() if row.type != COMPRESSED]
-    return [topic(name, rows[name].type, rows[name].qos) for name in dict.fromkeys(wanted) if name in rows]

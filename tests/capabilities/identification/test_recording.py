@@ -9,7 +9,7 @@ import pytest
 
 from golem.capabilities.identification import recording
 from golem.capabilities.identification.recording import COMMAND, STATE, IdentificationError, read_motion
-from golem.interfaces.rows import public_topics
+from golem.interfaces.recorded import public_topics
 from golem.middleware.bags.base import BagMessage
 from golem.middleware.bags.writer import BagWriter
 from golem.middleware.wire.convert import encode_low_command, encode_low_state

@@ -144,7 +144,7 @@ def test_a_killed_recorder_leaves_what_it_had(robot: CycloneParticipant, domain:
 
 @pytest.mark.slow
 def test_a_bag_is_played_onto_a_domain(robot: CycloneParticipant, domain: int, tmp_path: Path) -> None:
-    from golem.interfaces.rows import public_topics
+    from golem.interfaces.recorded import public_topics
     from golem.middleware.bags.base import BagMessage
     from golem.middleware.bags.writer import BagWriter
 

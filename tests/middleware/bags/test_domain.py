@@ -14,7 +14,7 @@ pytest.importorskip("mcap")
 pytest.importorskip("rosbags")
 
 from golem.errors import ConfigError
-from golem.interfaces.rows import public_topics
+from golem.interfaces.recorded import public_topics
 from golem.middleware.bags.base import BagMessage, BagTopic
 from golem.middleware.bags.catalog import offered, topic
 from golem.middleware.bags.player import PlayConfig, Player

@@ -19,7 +19,7 @@ from golem.middleware.dds.base import ENCAPSULATION, Qos
 from golem.middleware.ros.codec import dds_name, serialize, service
 from golem.middleware.ros.message import CodecError
 from golem.middleware.ros.node import RosNode
-from golem.middleware.ros.service import Header, pack, unpack
+from golem.middleware.ros.request_header import Header, pack, unpack
 
 from .conftest import SET_BOOL, World
 

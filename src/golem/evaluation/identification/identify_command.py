@@ -16,7 +16,7 @@ from golem.capabilities.identification.fit import Identified, identify, low_pass
 from golem.capabilities.identification.recording import COMMAND, STATE, RecordedMotion, read_motion
 from golem.capabilities.identification.regressor import NOMINAL, PAYLOAD
 from golem.errors import ConfigError
-from golem.interfaces.rows import public_topics
+from golem.interfaces.recorded import public_topics
 from golem.middleware.bags.writer import BagWriter
 from golem.output_file import write_file
 from golem.robots.model import mjcf

@@ -4,16 +4,10 @@ A client takes the replies that carry its handle. `clientid` and `serviceid` in 
 of a client or a server, let a peer know which reader belongs to which writer (`rmw_init_cs`, ros2/rmw_cyclonedds,
 rmw_node.cpp). Clients of Fast DDS send no header: a server reads their requests by a `service_link.ServiceLink`, which
 adds one, and not by the transport, which lets them pass without.
-
-The header that pairs replies with requests where services run over Cyclone DDS.
-
-A payload is CDR of the header followed by the body: the 64-bit handle of the client's request writer and a 64-bit
-sequence number, echoed by the reply (`cdds_request_header`, ros2/rmw_cyclonedds, serdata.hpp).
 """
 
 from __future__ import annotations
 
-import struct
 import time
 from collections import deque
 from collections.abc import Callable
@@ -24,41 +18,9 @@ from golem.middleware.ros import codec, names
 from golem.middleware.ros.future import Future, RosError
 from golem.middleware.ros.message import CodecError
 from golem.middleware.ros.node_endpoints import NodeEndpoints
+from golem.middleware.ros.request_header import Header, pack, unpack
 from golem.middleware.ros.typed import serialize
 from golem.middleware.rtps.submessages import FAST_DDS
-
-
-class Header(NamedTuple):
-    """Pairs a reply with its request.
-
-    Attributes:
-        client: handle of the client's request writer (uint64), as the client knows it.
-        sequence: number of the request, by its client (int64).
-    """
-
-    client: int
-    sequence: int
-
-
-def pack(header: Header, body: Payload) -> bytes:
-    """Return the payload that carries `body` (CDR with encapsulation header, little endian) behind `header`.
-
-    The header is 16 bytes long, so that the body keeps its alignment.
-    """
-    return b"".join((body[:4], struct.pack("<Qq", *header), body[4:]))
-
-
-def unpack(payload: Payload) -> tuple[Header, bytes]:
-    """Return header and body of a payload; the inverse of `pack`.
-
-    Raises:
-        CodecError: it is too short.
-    """
-    if len(payload) < 20:
-        raise CodecError(f"A service payload has at least 20 bytes, not {len(payload)}.")
-    order = "<" if payload[1] & 1 else ">"
-    return Header(*struct.unpack_from(f"{order}Qq", payload, 4)), b"".join((payload[:4], payload[20:]))
-
 
 SERVICES = Qos(depth=1000)
 """ROS's service profile keeps 10; the depth is nobody else's business, and a burst of goals is larger than that."""

@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterable
 
 from golem.middleware.dds.base import Payload, Qos, Sample
 from golem.middleware.dds.domain import first_port
-from golem.middleware.ros.service import Header, pack, unpack
+from golem.middleware.ros.request_header import Header, pack, unpack
 from golem.middleware.rtps import announcements, submessages
 from golem.middleware.rtps.announcements import (
     KEYLESS_READER,

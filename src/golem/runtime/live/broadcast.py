@@ -11,7 +11,8 @@ from functools import partial
 from pathlib import Path
 
 from golem.interfaces import topics
-from golem.interfaces.rows import Role, public_topics
+from golem.interfaces.recorded import public_topics
+from golem.interfaces.rows import Role
 from golem.middleware.bags.base import Sink
 from golem.middleware.bags.recorder import PERIOD, Recorder
 from golem.middleware.bus import Bus, News

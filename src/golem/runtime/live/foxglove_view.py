@@ -11,7 +11,7 @@ from tyro.conf import OmitArgPrefixes
 
 from golem.errors import unknown_name
 from golem.interfaces import public
-from golem.interfaces.rows import public_topics
+from golem.interfaces.recorded import public_topics
 from golem.middleware.bags.base import BagTopic
 from golem.middleware.bags.foxglove_server import FoxgloveServer, ServerConfig
 from golem.middleware.bags.recorder import Recorder

@@ -13,7 +13,7 @@ from pathlib import Path
 from tyro.conf import OmitArgPrefixes, Positional
 
 from golem.errors import ConfigError
-from golem.interfaces.rows import public_topics
+from golem.interfaces.recorded import public_topics
 from golem.middleware.bags.catalog import offered
 from golem.middleware.bags.player import PlayConfig, Player
 from golem.middleware.bags.reader import Bag, repair, told
