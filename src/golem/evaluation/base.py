@@ -7,6 +7,7 @@ be compared on it. It is the only place that may look at the simulator's truth, 
 from __future__ import annotations
 
 import importlib
+import itertools
 import json
 import math
 from abc import ABC, abstractmethod
@@ -147,6 +148,7 @@ class Rung(ABC, Generic[O]):
         timed: whether it measures the machine, so that nothing may run at the same time as a trial.
         slot: what its methods are, where they are modules.
         options: the options of this one.
+        varied: word of a case -> the option that has its values, or these.
         onlooker: who is shown the stacks of its trials: a viewer, or on a ladder what films the lost ones.
     """
 
@@ -160,6 +162,7 @@ class Rung(ABC, Generic[O]):
     provokes: bool = False
     timed: bool = False
     slot: ClassVar[str] = ""
+    varied: ClassVar[Mapping[str, str | Sequence[Any]]] = {}
 
     def __init__(self, options: O | None = None) -> None:
         """Take the options; None are the defaults.
@@ -203,9 +206,11 @@ class Rung(ABC, Generic[O]):
         """Return the cases that one method's trials are to be run under, as far as `results` tells yet.
 
         Every case is run with all indices. It is asked again whenever a case is complete; what it returned before is
-        returned again. An adaptive rung may add cases that follow from results.
+        returned again. An adaptive rung may add cases that follow from results. By default: all combinations of what is
+        `varied`.
         """
-        return ({},)
+        values = [getattr(self.options, v) if isinstance(v, str) else v for v in self.varied.values()]
+        return [dict(zip(self.varied, combined, strict=True)) for combined in itertools.product(*values)]
 
     def together(self, spec: TrialSpec) -> Hashable:
         """Return a key that the trials have in common which are best run in one go, by `run_together`."""

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from golem import registry
 from golem.errors import ConfigError, GolemError
-from golem.evaluation.base import DONE, Case, Results, Rung, TrialOutcome, TrialSpec
+from golem.evaluation.base import DONE, Rung, TrialOutcome, TrialSpec
 from golem.evaluation.episodes.episode import Episode, episode_seed, legs_stack
 from golem.evaluation.episodes.scripted_motion import ArmMotion, ScriptedMotion
 from golem.hardware.estimator.base import BaseEstimator
@@ -225,6 +225,7 @@ class BaseEstimation(Rung[BaseEstimationOptions]):
     """
 
     name = "base-estimation"
+    varied = {"condition": (*SPOILS, PUSHED)}
     Options = BaseEstimationOptions
     default_methods = ("random_walk_kf", "invariant_ekf")
     default_n = 3
@@ -238,10 +239,6 @@ class BaseEstimation(Rung[BaseEstimationOptions]):
         walking = legs_stack(self.options.legs, profile, overrides)
         registry.load(SLOT, _choice(method).use)
         return {**stack_facts(walking), "method": stack_facts(walking.with_choice(SLOT, method))["user_files"]}
-
-    def cases(self, results: Results) -> Sequence[Case]:
-        """Return what the sensors suffer."""
-        return [{"condition": name} for name in (*SPOILS, PUSHED)]
 
     def together(self, spec: TrialSpec) -> Hashable:
         """Return what trials share that read the same recording."""

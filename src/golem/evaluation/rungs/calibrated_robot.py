@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +13,7 @@ import numpy as np
 
 from golem import registry
 from golem.errors import ConfigError
-from golem.evaluation.base import DONE, Case, Results, Rung, TrialOutcome, TrialSpec
+from golem.evaluation.base import DONE, Rung, TrialOutcome, TrialSpec
 from golem.evaluation.blame.oracles import with_modules
 from golem.evaluation.episodes.episode import episode_seed
 from golem.evaluation.rungs.pick_screw import SLOT, PickOptions, PickRung
@@ -148,16 +148,13 @@ class CalibrationRung(Rung[CalibrationOptions]):
     """
 
     name = "calibration"
+    varied = {"what": "what"}
     Options = CalibrationOptions
     default_methods = (SKILL,)
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
         """Return what determines a trial besides its seed; see `Rung`."""
         return stack_facts(tagged_stack(profile, overrides))
-
-    def cases(self, results: Results) -> Sequence[Case]:
-        """Return what is calibrated."""
-        return [{"what": what} for what in self.options.what]
 
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
         """Run one trial; see `Rung`."""

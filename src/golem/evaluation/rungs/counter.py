@@ -229,15 +229,12 @@ class FetchRung(KitchenRung[FetchOptions]):
     """
 
     name = "fetch"
+    varied = {"moved": "moved"}
     Options = FetchOptions
     default_methods = ("object_map",)
     slot = "memory"
     balances = True
     stack_name = "errand"
-
-    def cases(self, results: Results) -> Sequence[Case]:
-        """Return whether the thing is moved meanwhile; see `Rung`."""
-        return [{"moved": moved} for moved in self.options.moved]
 
     def errand(
         self, spec: TrialSpec, running: LockstepRunner, robot: MujocoRobot, kitchen: KitchenLayout, oracle: Oracle

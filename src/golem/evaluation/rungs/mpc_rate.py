@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +11,7 @@ import numpy as np
 
 from golem.capabilities.legs.mpc.controller import MPC, MPCConfig
 from golem.errors import ConfigError
-from golem.evaluation.base import Case, Results, TrialOutcome, TrialSpec
+from golem.evaluation.base import TrialOutcome, TrialSpec
 from golem.evaluation.episodes.episode import Episode, episode_seed
 from golem.evaluation.rungs.leg_rung import LegRung, PlantOptions, judged
 from golem.evaluation.rungs.walking import SETTLE
@@ -35,15 +34,12 @@ class MpcRate(LegRung[PlantOptions]):
     """
 
     name = "mpc-rate"
+    varied = {"samples": SAMPLES}
     slot = ""  # the MPC alone; `{use: mpc, option: value}` gives it options
     default_methods = ("mpc",)
     default_n = 1
     default_profile = "bench"
     timed = True
-
-    def cases(self, results: Results) -> Sequence[Case]:
-        """Return the numbers of samples."""
-        return [{"samples": n} for n in SAMPLES]
 
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
         """Run one trial; see `Rung`."""

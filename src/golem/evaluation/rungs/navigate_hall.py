@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +15,7 @@ import numpy as np
 
 from golem.capabilities.navigation.map_picture import GOAL, TRACK, WAY, MapPicture
 from golem.capabilities.navigation.movers import BODY
-from golem.evaluation.base import DONE, Case, Results, Rung, TrialOutcome, TrialSpec
+from golem.evaluation.base import DONE, Rung, TrialOutcome, TrialSpec
 from golem.evaluation.episodes.contacts import ContactWatch
 from golem.evaluation.episodes.episode import Episode, Loss, episode_seed, legs_stack
 from golem.evaluation.episodes.survey import survey
@@ -140,6 +140,7 @@ class NavigateRung(Rung[NavigateOptions]):
     """
 
     name = "navigate"
+    varied = {"map": "map"}
     Options = NavigateOptions
     default_methods = ("costmap_astar",)
     slot = SLOT
@@ -148,10 +149,6 @@ class NavigateRung(Rung[NavigateOptions]):
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
         """Return what determines a trial besides its seed; see `Rung`."""
         return {**stack_facts(self._stack(method, profile, overrides)), "distance": DISTANCE, "spread": SPREAD}
-
-    def cases(self, results: Results) -> Sequence[Case]:
-        """Return the maps the robot has."""
-        return [{"map": kind} for kind in self.options.map]
 
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
         """Run one trial; see `Rung`."""

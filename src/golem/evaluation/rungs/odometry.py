@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from golem import registry
 from golem.capabilities.odometry.base import LidarOdometry, OdometryEstimate
-from golem.evaluation.base import DONE, Case, Results, Rung, TrialOutcome, TrialSpec
+from golem.evaluation.base import DONE, Rung, TrialOutcome, TrialSpec
 from golem.evaluation.episodes.episode import legs_stack
 from golem.evaluation.episodes.lidar_walk import (
     START,
@@ -161,6 +161,7 @@ class OdometryRung(Rung[OdometryOptions]):
     """
 
     name = "odometry"
+    varied = {"case": "case"}
     Options = OdometryOptions
     default_methods = ("lio", "legs")
     default_n = 20
@@ -175,10 +176,6 @@ class OdometryRung(Rung[OdometryOptions]):
         _make(_choice(method))
         facts = stack_facts(walking.with_choice(SLOT, method))
         return {**facts, "cases": {name: _plain(CONDITIONS[name]) for name in self.options.case}}
-
-    def cases(self, results: Results) -> Sequence[Case]:
-        """Return where and under what the robot walks."""
-        return [{"case": name} for name in self.options.case]
 
     def together(self, spec: TrialSpec) -> Hashable:
         """Return what trials share that are of one walk."""

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from golem import registry
 from golem.capabilities.memory.base import Memory, Place, When
-from golem.evaluation.base import DONE, Case, Outcomes, Results, Rung, TrialOutcome, TrialSpec
+from golem.evaluation.base import DONE, Outcomes, Rung, TrialOutcome, TrialSpec
 from golem.evaluation.episodes.relocation import Rates, Relocation, Setting, Thing, relocation
 from golem.evaluation.metrics.statistics import mean_interval
 from golem.evaluation.metrics.text_table import TextTable
@@ -185,6 +185,7 @@ class MemoryRung(Rung[Any]):
     """
 
     name = "memory"
+    varied = {"condition": tuple(CONDITIONS)}
     default_methods = ("top_down_map", "frame_index", "reranked", "object_map")
     slot = SLOT
     default_n = 20
@@ -194,10 +195,6 @@ class MemoryRung(Rung[Any]):
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
         """Return what determines a trial besides its seed; see `Rung`."""
         return stack_facts(Stack(profile=profile).with_choice(SLOT, method))
-
-    def cases(self, results: Results) -> Sequence[Case]:
-        """Return what the looks suffer."""
-        return [{"condition": name} for name in CONDITIONS]
 
     def together(self, spec: TrialSpec) -> Hashable:
         """Return what trials share that see the same looks."""

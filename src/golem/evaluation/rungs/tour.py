@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from golem.errors import ConfigError
-from golem.evaluation.base import Case, Outcomes, Results, TrialOutcome, TrialSpec
+from golem.evaluation.base import Outcomes, TrialOutcome, TrialSpec
 from golem.evaluation.episodes import league_tour as league
 from golem.evaluation.episodes.episode import Episode, Loss
 from golem.evaluation.episodes.scripted_motion import ScriptedMotion
@@ -48,6 +48,7 @@ class Tour(LegRung[TourOptions]):
     """Walk to 18 waypoints in 90 s, arms in random motion, a punch on a random joint every 5 s, in several engines."""
 
     name = "tour"
+    varied = {"engine": "engine"}
     Options = TourOptions
     provokes = True
     default_n = 64
@@ -58,10 +59,6 @@ class Tour(LegRung[TourOptions]):
         super().__init__(options)
         self._each("engine")
         lifted(SafetyLimits.from_profile(), self.options.lift)
-
-    def cases(self, results: Results) -> Sequence[Case]:
-        """Return every engine."""
-        return [{"engine": engine} for engine in self.options.engine]
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
         """Return what determines a trial besides its seed; see `Rung`."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -12,7 +12,7 @@ import numpy as np
 
 from golem.capabilities.legs.base import Envelope
 from golem.errors import unknown_name
-from golem.evaluation.base import Case, Results, TrialOutcome, TrialSpec
+from golem.evaluation.base import TrialOutcome, TrialSpec
 from golem.evaluation.episodes.episode import Episode, Loss
 from golem.evaluation.episodes.scripted_motion import ArmMotion, ScriptedMotion
 from golem.evaluation.episodes.simulated_odometry import SimulatedOdometry
@@ -57,6 +57,7 @@ class WalkRough(LegRung[WalkRoughOptions]):
     """Walk ahead on a slope, tiles, a step or slippery ground, or with loaded hands, and stop."""
 
     name = "walk-rough"
+    varied = {"ground": "ground"}
     Options = WalkRoughOptions
     default_n = 20
     default_profile = "bench"
@@ -69,10 +70,6 @@ class WalkRough(LegRung[WalkRoughOptions]):
         for ground in self.options.ground:
             if ground not in GROUNDS:
                 raise unknown_name("ground", ground, GROUNDS)
-
-    def cases(self, results: Results) -> Sequence[Case]:
-        """Return every ground."""
-        return [{"ground": ground} for ground in self.options.ground]
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
         """Return what determines a trial besides its seed; see `Rung`."""
