@@ -11,6 +11,7 @@ import contextlib
 import io
 import time
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Any
 
 import cv2
@@ -59,7 +60,7 @@ SHOWN = 0.6
 """Time for which the arrow of a push is shown at least [s]: the push itself is over in the blink of an eye."""
 
 
-class LiveView:
+class LiveView(AbstractContextManager["LiveView", None]):
     """Shows one running stack and drives it in real time, in the calling thread.
 
     Attributes:
@@ -346,10 +347,6 @@ class LiveView:
         with contextlib.redirect_stdout(io.StringIO()):
             self._server.stop()
         self._view.close()
-
-    def __enter__(self) -> LiveView:
-        """Return the view itself."""
-        return self
 
     def __exit__(self, *_: object) -> None:
         """Stop serving."""

@@ -13,9 +13,9 @@ import fcntl
 import json
 import os
 from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 from golem.errors import ConfigError, OutputError
@@ -49,7 +49,7 @@ class Finished:
     stops: Mapping[str, int] = field(default_factory=dict[str, int])
 
 
-class RunFolder:
+class RunFolder(AbstractContextManager["RunFolder", None]):
     """The folder of one run, held against a second writer while it is open.
 
     Opening makes the folder and writes nothing else; the files appear with the first trial. A folder that was made
@@ -80,12 +80,7 @@ class RunFolder:
             os.close(self._lock)
             raise OutputError(f"Cannot write to --out {path}: Permission denied; choose another.")
 
-    def __enter__(self) -> RunFolder:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Release the folder, and remove it if it is empty and was made here."""
         os.close(self._lock)
         if self._made and not any(self.path.iterdir()):

@@ -8,7 +8,7 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Hashable, Iterable, Mapping, Sequence
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,7 +27,7 @@ PERIOD = 30.0
 """Time between two lines [s]."""
 
 
-class Progress:
+class Progress(AbstractContextManager["Progress", None]):
     """Shows on stderr how many trials are done."""
 
     def __init__(self, kept: int) -> None:
@@ -57,9 +57,6 @@ class Progress:
         """Print lines without tearing the bar apart."""
         tqdm.write(text, file=sys.stderr)
         sys.stderr.flush()
-
-    def __enter__(self) -> Progress:
-        return self
 
     def __exit__(self, *_: object) -> None:
         """Leave the bar as it is."""

@@ -12,7 +12,7 @@ import statistics
 import subprocess
 import sys
 from collections.abc import Iterable, Sequence
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryFile
@@ -84,7 +84,7 @@ def run_loop_bench(config: LoopBenchConfig) -> dict[str, Any]:
     return found
 
 
-class Worker:
+class Worker(AbstractContextManager["Worker", None]):
     """A process that measures one stack of one checkout; closed when its block is left."""
 
     def __init__(self, source: Path, name: str) -> None:
@@ -100,10 +100,6 @@ class Worker:
             text=True,
             env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
         )
-
-    def __enter__(self) -> Worker:
-        """Return it."""
-        return self
 
     def ask(self, *words: object) -> Any:
         """Return its answer to a request; see `loop_measure.main`.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from types import TracebackType
+from contextlib import AbstractContextManager
 
 import mujoco
 import numpy as np
@@ -21,7 +21,7 @@ FANCY_FLAGS = (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTIO
 SEGMENT_FLAGS = (mujoco.mjtRndFlag.mjRND_SEGMENT, mujoco.mjtRndFlag.mjRND_IDCOLOR)
 
 
-class CameraRig:
+class CameraRig(AbstractContextManager["CameraRig", None]):
     """Cameras of one compiled model, rendered on demand in the calling thread.
 
     Without `fancy` there are no shadows, reflections and multisampling, which on a CPU cost eight times the rest.
@@ -154,12 +154,6 @@ class CameraRig:
             self._context.free()
             self._context = None
 
-    def __enter__(self) -> CameraRig:
-        """Return the rig itself."""
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Close the rig."""
         self.close()
