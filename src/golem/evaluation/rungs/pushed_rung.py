@@ -11,7 +11,6 @@ from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import Literal, Protocol, TypeVar
 
 from golem.errors import ConfigError, ModuleFault, unknown_name
@@ -201,10 +200,6 @@ class PushedRung(LegRung[O]):
         """What the robot does when it is pushed: each phase, those of walking at each twist."""
         o = self.options
         return [(p, walk) for p in o.phase for walk in ((STILL,) if p == "standing" else o.walk)]
-
-    def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
-        """Run one trial; see `Rung`."""
-        return self.run_together([spec])[0]
 
     def run_together(self, specs: Sequence[TrialSpec]) -> Sequence[TrialOutcome]:
         """Bring one robot to the moment of the push, and push it from there, each time in a copy of the process."""
