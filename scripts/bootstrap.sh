@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Usage: scripts/bootstrap.sh GROUP...     GROUP is the name of a lock in requirements/: cluster, core, dds, dev, docs, hardware, lidar, physx, pink, realsense, record, report, train, view, vision
+# Usage: scripts/bootstrap.sh GROUP...     GROUP is the name of a lock in requirements/: agent, cluster, core, data, dds, dev, docs, graspgen, gym, hardware, lidar, physx, pink, policy, realsense, record, report, train, view, vision
 #
 # Creates .venv, or $VENV, with the locked packages of every GROUP and this package itself, and sees to it that they find
 # their system libraries. Needs Python 3.11-3.13 and a network to the package index; brings everything else: uv goes to
