@@ -19,6 +19,7 @@ from golem.datasets.schema import Recipe
 from golem.errors import ConfigError, unknown_name
 from golem.interfaces import images, public, topics
 from golem.interfaces import ros_convert as convert
+from golem.interfaces.images import Pairing
 from golem.interfaces.payloads import Detections, Exposure, LegStatus
 from golem.middleware.bags.base import BagMessage
 from golem.middleware.bus import Bus, News
@@ -27,7 +28,6 @@ from golem.middleware.ros.message import NANO
 from golem.middleware.ros.msgs.sensor_msgs import Image
 from golem.middleware.wire.convert import decode_low_command
 from golem.robots.sensors.cameras import CAMERAS
-from golem.robots.sensors.pairing import Pairing
 from golem.types import SIDES, CameraInfo, PlanarPose, Twist
 
 

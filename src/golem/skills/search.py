@@ -17,7 +17,7 @@ from golem.skills.context import Context
 from golem.skills.fetch import STAGE, TURN, before
 from golem.skills.navigate import NavigateGoal
 from golem.skills.pose_goal import FIRST_REPORT
-from golem.skills.recalled import RecalledPlaces, ask
+from golem.skills.recall import RecalledPlaces, ask
 from golem.skills.remember import RememberGoal
 from golem.types import PlanarPose
 

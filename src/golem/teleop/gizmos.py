@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from golem.dashboard.stage import WORLD
+from golem.dashboard.server import WORLD
 from golem.teleop.driving import Driving
 from golem.teleop.pilot import HandPilot
 from golem.types import SIDES, Array, Side

@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from golem.robots.model.kinematics import Kinematics
 
 from golem.capabilities.policies.openpi import PolicyLinkConfig
 from golem.capabilities.policies.stream import ActionStream
@@ -20,6 +19,7 @@ from golem.capabilities.policies.vectors import (
     palm_pose,
 )
 from golem.errors import ServiceUnavailable
+from golem.robots.model.pinocchio_model import Kinematics
 from golem.types import BaseEstimate, HandCommand, HandState, Imu, LowCommand, LowState, Twist
 
 IMU = Imu(np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), np.zeros(3))

@@ -15,7 +15,7 @@ import numpy as np
 from golem.errors import GolemError
 from golem.interfaces import topics
 from golem.middleware.bus import Bus
-from golem.robots.model.kinematics import Kinematics
+from golem.robots.model.pinocchio_model import Kinematics
 from golem.robots.model.table import JOINT_NAMES
 from golem.types import SIDES, UPPER, Array, BaseEstimate, HandCommand, HandState, LowCommand, LowState, Side, Twist
 

@@ -16,10 +16,10 @@ from tyro.conf import Positional, arg
 from golem.errors import ConfigError, unknown_name
 from golem.evaluation.base import RUNGS, case_name, make_rung
 from golem.evaluation.harness.records import TrialRecord, read_records
-from golem.evaluation.metrics.metric_names import metric
 from golem.evaluation.metrics.prediction_powered import prediction_powered
 from golem.evaluation.metrics.published import GGX_F
 from golem.evaluation.metrics.statistics import Interval, wilson
+from golem.evaluation.metrics.summary import metric
 from golem.evaluation.metrics.text_table import TextTable, short_names
 from golem.finite import check_finite
 from golem.options import fill, read_yaml

@@ -19,10 +19,9 @@ from golem.evaluation.base import case_name
 from golem.evaluation.harness.records import TrialRecord, artefacts, trial_name
 from golem.evaluation.harness.run_folder import read_facts
 from golem.evaluation.metrics.anytime import anytime_interval
-from golem.evaluation.metrics.metric_names import metric
 from golem.evaluation.metrics.results import trials_csv
 from golem.evaluation.metrics.statistics import wilson
-from golem.evaluation.metrics.summary import NO_MODULE, summarise
+from golem.evaluation.metrics.summary import NO_MODULE, metric, summarise
 from golem.evaluation.metrics.tables import losses, metrics, number
 from golem.evaluation.metrics.text_table import short_names
 from golem.evaluation.report.svg_figure import render_page, style

@@ -12,8 +12,6 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from golem.evaluation.episodes.errand_watch import ErrandWatch
-from golem.evaluation.rungs.fetch_errand import LOOK
 
 from golem.agent.audit import AuditLog
 from golem.agent.desk import Desk
@@ -22,9 +20,9 @@ from golem.agent.rules import Rules
 from golem.agent.stack_body import StackBody
 from golem.errors import unknown_name
 from golem.evaluation.base import DONE, Case, Results, TrialSpec
-from golem.evaluation.episodes.counter_watch import LIFTED, CounterWatch
+from golem.evaluation.episodes.counter_watch import LIFTED, CounterWatch, ErrandWatch
 from golem.evaluation.episodes.oracle import Oracle, whereabouts
-from golem.evaluation.rungs.counter import AREA, FREE, radius
+from golem.evaluation.rungs.counter import AREA, FREE, LOOK, radius
 from golem.evaluation.rungs.kitchen_rung import Errand, KitchenRung, Verdict
 from golem.package_data import load_data
 from golem.robots.mujoco.engine import MujocoRobot
@@ -190,7 +188,7 @@ class ErrandsRung(KitchenRung[ErrandsOptions]):
 
         def judge() -> Verdict:
             out = sum(one.where == "tray" for one in whereabouts(robot))
-            heads = np.array([f.in_odom[:2] for f in fasteners])
+            heads = np.array([f.position[:2] for f in fasteners])
             told = [fasteners[int(np.linalg.norm(heads - at, axis=1).argmin())] for at in report.facts.get("tight", [])]
             wrong = sum(f.loose for f in told)
             why = (
