@@ -51,11 +51,11 @@ def locks() -> dict[str, tuple[str, list[str]]]:
 
 def licence(package: Distribution) -> str:
     """Return what the metadata say: the expression, else the classifiers, else the first line of the text."""
-    said = package.metadata
-    expression = said.get("License-Expression")
-    trove = [c.rpartition(" :: ")[2] for c in said.get_all("Classifier") or () if c.startswith("License ::")]
+    said = {key: package.metadata.get_all(key) or [""] for key in ("License-Expression", "License", "Classifier")}
+    expression = said["License-Expression"][0]
+    trove = [c.rpartition(" :: ")[2] for c in said["Classifier"] if c.startswith("License ::")]
     names = [SHORT.get(c, c) for c in trove if c != "OSI Approved"]
-    text = (said.get("License") or "").strip()
+    text = said["License"][0].strip()
     return expression or ", ".join(names) or (text.splitlines()[0][:60] if text else "not said")
 
 

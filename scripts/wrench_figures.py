@@ -25,6 +25,7 @@ PUSHES = ((8.0, 0, 0), (-8.0, 0, 0), (0, 8.0, 0), (0, -8.0, 0), (0, 0, 8.0), (0,
 def felt(running: LockstepRunner, force: HandForce) -> Array:
     """Return the (2, 3) forces of the hands, in odom [N]."""
     state, base = running.bus.latest(topics.LOW_STATE), running.bus.latest(topics.BASE)
+    assert state is not None and base is not None
     return np.array([base.T_odom_base[:3, :3] @ force(side, state.q[UPPER], state.tau[UPPER]) for side in SIDES])
 
 

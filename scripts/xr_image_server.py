@@ -42,7 +42,8 @@ def picture(message: Any) -> np.ndarray:
     """Return the picture in a CompressedImage, black where none came."""
     if message is None:
         return np.zeros((SIZE[1], SIZE[0], 3), np.uint8)
-    return cv2.resize(cv2.imdecode(np.frombuffer(bytes(message.data), np.uint8), cv2.IMREAD_COLOR), SIZE)
+    found = cv2.imdecode(np.frombuffer(bytes(message.data), np.uint8), cv2.IMREAD_COLOR)
+    return np.zeros((SIZE[1], SIZE[0], 3), np.uint8) if found is None else cv2.resize(found, SIZE)
 
 
 def serve(config: ServerConfig) -> None:

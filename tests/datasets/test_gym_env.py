@@ -76,7 +76,7 @@ def test_an_episode_ends_with_its_time_and_repeats_itself() -> None:
     for _ in range(2):
         first, info = env.reset(seed=3)
         assert info == {"trial": 3} and first["image_right_hand"].shape == (54, 96, 3)
-        rows, action = [first], np.zeros(len(ACTIONS), np.float32)
+        rows, action = [first], np.zeros(len(ACTIONS))
         action[8] = -1.0  # the right hand goes down
         while True:
             seen, reward, terminated, truncated, info = env.step(action)

@@ -11,9 +11,9 @@ from golem.stack import load_stack
 
 
 def test_a_goal_without_sense_is_refused() -> None:
-    for goal in ({"text": " "}, {"text": "mug", "places": 31}, {"text": "mug", "places": -1}):
+    for text, places in ((" ", 5), ("mug", 31), ("mug", -1)):
         with pytest.raises(ConfigError):
-            SearchGoal(**goal)
+            SearchGoal(text, places=places)
 
 
 @pytest.mark.slow

@@ -35,13 +35,13 @@ class Moment:
 
     Attributes:
         x, y: of base_link in odom [m].
-        velocity: (2,) of base_link in odom [m/s].
+        velocity: x, y of base_link in odom [m/s].
         forces: (2, 3) of the left and the right hand on the world, in their grasp frames [N].
     """
 
     x: float
     y: float
-    velocity: Array
+    velocity: tuple[float, float]
     forces: Array
 
 
@@ -106,7 +106,9 @@ class Body(ABC):
         if base is None or state is None:
             return None
         forces = np.array([self._force.wrench(side, state.q[UPPER], state.tau[UPPER])[:3] for side in SIDES])
-        return Moment(*base.T_odom_base[:2, 3].tolist(), base.velocity[:2], forces)
+        x, y = base.T_odom_base[:2, 3].tolist()
+        vx, vy = base.velocity[:2].tolist()
+        return Moment(x, y, (vx, vy), forces)
 
     def in_odom(self, frame: str, x: float, y: float) -> tuple[float, float] | None:
         """Return a place given in a frame, in odom [m]; None where that is not known."""

@@ -127,10 +127,12 @@ class DomainBody(Body):
         seen.close()
         if message is None:
             return None
-        rgb = cv2.imdecode(np.frombuffer(bytes(message.data), np.uint8), cv2.IMREAD_COLOR)[:, :, ::-1]
+        bgr = cv2.imdecode(np.frombuffer(bytes(message.data), np.uint8), cv2.IMREAD_COLOR)
+        if bgr is None:
+            return None
         objects = () if sightings is None else sightings.objects
         found = tuple((o.label, float(o.score), o.position.x, o.position.y, o.position.z) for o in objects)
-        return Picture(drawn(np.asarray(rgb, np.uint8)), found)
+        return Picture(drawn(np.asarray(bgr[:, :, ::-1], np.uint8)), found)
 
     def step(self) -> None:
         """Take what has come; see `Body`."""

@@ -94,7 +94,7 @@ class StackBody(Body):
             return Picture(drawn(self._robot.capture(camera)[0]), ())
         seen = self._bus.latest(topics.detections(camera))
         found = () if seen is None or abs(seen.t - frame.t) > FRESH else seen.objects
-        listed = tuple((o.label, float(o.detection.score), *map(float, o.position)) for o in found)
+        listed = tuple((o.label, float(o.detection.score), *o.position.tolist()) for o in found)
         return Picture(drawn(frame.rgb, [(o.label, o.detection.box.tolist()) for o in found]), listed)
 
     def step(self) -> None:

@@ -17,7 +17,7 @@ from golem.robots.model.magpie_model import MAX_GAP
 from golem.skills.base import SkillResult
 from golem.skills.context import Context
 from golem.skills.policy_view import PolicyView
-from golem.types import SIDES, Array, Twist
+from golem.types import SIDES, Array, Side, Twist
 
 FORCE = 3.0
 """What a finger presses with where a policy closes a hand [N] [own]."""
@@ -85,7 +85,7 @@ class PolicySkill:
             ActionRefused: a hand cannot be meant to go there.
         """
         T = context.T_odom_base
-        goals = {side: T @ palm_pose(action[9 * k : 9 * k + 9]) for k, side in enumerate(SIDES)}
+        goals: dict[Side, Array] = {side: T @ palm_pose(action[9 * k : 9 * k + 9]) for k, side in enumerate(SIDES)}
         for side, goal in goals.items():
             check_near(side, goal, context.arms[side].pose)
         context.torso = float(action[TORSO])

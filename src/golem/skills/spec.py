@@ -199,6 +199,7 @@ def _fitted(where: str, of: Schema, value: Any) -> Any:
     kinds, wanted = _JSON[of["type"]]
     if not isinstance(value, kinds) or (isinstance(value, bool) and of["type"] != "boolean"):
         raise ConfigError(f"The {where} is {wanted}, not {shorten(repr(value))}.")
+    value = cast(Any, value)
     low, high = of.get("minimum", of.get("exclusiveMinimum")), of.get("maximum", of.get("exclusiveMaximum"))
     outside = (low is not None and (value < low or value == of.get("exclusiveMinimum"))) or (
         high is not None and (value > high or value == of.get("exclusiveMaximum"))

@@ -16,7 +16,7 @@ from golem.capabilities.policies.openpi import pack_array, unpack_array
 
 
 def pack(value: Any) -> bytes:
-    return bytes(msgpack.packb(value, default=pack_array))
+    return msgpack.packb(value, default=pack_array) or b""
 
 
 @contextmanager

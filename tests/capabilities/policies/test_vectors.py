@@ -26,7 +26,7 @@ IMU = Imu(np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), np.zeros(3))
 
 
 def test_every_number_is_where_its_name_says() -> None:
-    q = 0.01 * np.arange(27)
+    q = 0.01 * np.arange(27.0)
     T = np.eye(4)
     T[:3, :3] = ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
     base = BaseEstimate(0.0, T, np.array([0.0, 0.5, 0.0]), 0.9)

@@ -34,7 +34,7 @@ def endless(tmp_path: Path) -> str:
 def test_an_endless_module_is_named_with_the_promise_and_its_line(
     endless: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(cpu_limit, "LIMIT", 0.6)
+    monkeypatch.setattr("golem.evaluation.conformance.examine.LIMIT", 0.6)
     report = examine(candidate("properties", endless))
     (failed,) = report.failed
     assert failed.check == "answers_soundly"
@@ -44,7 +44,7 @@ def test_an_endless_module_is_named_with_the_promise_and_its_line(
 
 
 def test_another_thread_has_no_limit(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cpu_limit, "LIMIT", 0.0)
+    monkeypatch.setattr("golem.evaluation.conformance.examine.LIMIT", 0.0)
     done: list[int] = []
 
     def work() -> None:

@@ -16,7 +16,7 @@ from golem.middleware.dds.base import LATCHED, Participant, Sample
 from golem.middleware.dds.local import LocalDomain
 from golem.middleware.ros.codec import dds_name, type_hash
 from golem.middleware.ros.graph import INFO, PARTICIPANT_USER_DATA
-from golem.middleware.ros.node import RosNode
+from golem.middleware.ros.node import SERVICES, RosNode
 
 from .conftest import PICK, SET_BOOL, STRING
 
@@ -56,7 +56,7 @@ def test_a_node_is_announced_in_the_layout_of_its_peers(distro: str, store: Stor
     assert (entry.node_namespace, entry.node_name) == ("/robot", "twin")
     assert list(entry.writer_gid_seq[-1].data) == gid(publisher.writer.guid, size)
     assert list(entry.reader_gid_seq[-1].data) == gid(subscription.inbox.guid, size)
-    assert len(entry.writer_gid_seq) == len(entry.reader_gid_seq) == 1 + len(node.SERVICES)
+    assert len(entry.writer_gid_seq) == len(entry.reader_gid_seq) == 1 + len(SERVICES)
     assert bytes(types.serialize_cdr(info, INFO)) == bytes(sample.payload)[: len(types.serialize_cdr(info, INFO))]
 
 
@@ -74,7 +74,7 @@ def test_what_is_closed_is_announced_no_more() -> None:
         (entry,) = info.node_entities_info_seq
         return len(entry.reader_gid_seq), len(entry.writer_gid_seq)
 
-    own = len(node.SERVICES)
+    own = len(SERVICES)
     assert endpoints() == (own + 3, own + 5)
     server.close()
     assert endpoints() == (own, own)

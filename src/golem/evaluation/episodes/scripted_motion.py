@@ -65,7 +65,7 @@ class ScriptedMotion:
                     T[:3, 3] += share * (position - home[:3, 3])
                     # The hands move with the base: what is judged is the legs, not whether a hand keeps its place.
                     palms.append(context.T_odom_base @ T)
-                context.publish(topics.PALM_TARGETS, PalmTargets(context.t, *palms))
+                context.publish(topics.PALM_TARGETS, PalmTargets(context.t, palms[0], palms[1]))
             if self.twist is not None:
                 context.publish(topics.TWIST, self.twist(elapsed))
             await context.tick()

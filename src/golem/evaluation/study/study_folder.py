@@ -126,7 +126,7 @@ class Study:
         for cell in self.cells:
             if not rung_class(cell.records[0].rung).adaptive:
                 found += [
-                    (f"{cell.name}: {a}", b, *rest) for a, b, *rest in pairs_of(cell.records, cell.methods, self.rule)
+                    (f"{cell.name}: {a}", b, x, y) for a, b, x, y in pairs_of(cell.records, cell.methods, self.rule)
                 ]
         by_name = {cell.name: cell for cell in self.cells}
         for one, other in self.compare:
