@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from golem.robots.model import magpie_model, mjcf
+from golem.robots.model import magpie_model, mjcf, table
 from golem.robots.model.spatial import transform
-from golem.robots.model.table import BASE_LINK
 from golem.robots.mujoco.camera import CameraRig
 from golem.robots.sensors.cameras import CAMERAS, T_MUJOCO_OPTICAL
 from golem.robots.worlds.conditions import Conditions
@@ -128,7 +127,7 @@ def compile_scene(spec: mujoco.MjSpec, plain: bool, rng: np.random.Generator) ->
         _add_distractor(spec, k, rng)
     model = spec.compile()
     bodies = tuple(model.body(f"distractor_{k}").id for k in range(DISTRACTORS))
-    root = model.body(BASE_LINK).rootid[0]
+    root = model.body(table.BASE_LINK).rootid[0]
     robot = np.flatnonzero(model.body_rootid[model.geom_bodyid] == root).astype(np.int64)
     colours = model.geom_rgba.copy(), model.geom_matid.copy()
     return Compiled(model, mujoco.MjData(model), robot, bodies, plain, *colours)
