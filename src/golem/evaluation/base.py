@@ -135,7 +135,7 @@ class Rung(ABC, Generic[O]):
 
     A rung is made from its options, once per worker process, and may keep compiled models between trials; the
     outcome of a trial depends on its spec alone, never on the trials that ran before it. A new rung is one file and
-    one line in `rung_table`; the first sentence of its docstring is what `golem ladder --help` says of it.
+    one line in `rungs.yaml`; the first sentence of its docstring is what `golem ladder --help` says of it.
 
     Attributes:
         name: the name it is registered under.
