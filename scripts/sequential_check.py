@@ -78,7 +78,7 @@ def errors(rng: np.random.Generator, studies: int) -> list[str]:
 def fixed_n(rng: np.random.Generator, a: float, b: float, shared: float) -> tuple[int, int, int]:
     """Return the least n of McNemar's exact test with 80 and with 90 % power, and of Wilson's intervals apart, 80 %."""
     x, y = draws(rng, a, b, shared, BLOCK, MOST)
-    n = np.arange(1.0, MOST + 1)
+    n = np.arange(1.0, MOST + 1.0)
     won, lost = (np.cumsum(one, axis=1) for one in (x > y, y > x))
     told = 2.0 * binom.cdf(np.minimum(won, lost), won + lost, 0.5) <= ALPHA
     ends_x, ends_y = (wilson_ends(np.cumsum(one, axis=1), n) for one in (x, y))

@@ -127,7 +127,8 @@ def equal_within(a: ArrayLike, b: ArrayLike, margin: float, alpha: float = ALPHA
     """Return after each of (..., T) pairs whether a difference of `margin` or more, either way, is refuted."""
     values = (1.0 + np.asarray(a, np.float64) - np.asarray(b, np.float64)) / 2.0
     capital = log_capital(values, [(1.0 - margin) / 2.0, (1.0 + margin) / 2.0], alpha)
-    return np.asarray((np.maximum.accumulate(capital, axis=-2) >= math.log(1.0 / alpha)).all(axis=-1))
+    refuted = np.maximum.accumulate(capital, axis=-2) >= math.log(1.0 / alpha)
+    return refuted[..., 0] & refuted[..., 1]
 
 
 def _is_binary(x: Array) -> bool:

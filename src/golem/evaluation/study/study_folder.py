@@ -125,9 +125,8 @@ class Study:
         found: list[Pair] = []
         for cell in self.cells:
             if not rung_class(cell.records[0].rung).adaptive:
-                found += [
-                    (f"{cell.name}: {a}", b, x, y) for a, b, x, y in pairs_of(cell.records, cell.methods, self.rule)
-                ]
+                own = pairs_of(cell.records, cell.methods, self.rule)
+                found += [(f"{cell.name}: {a}", b, one, other) for a, b, one, other in own]
         by_name = {cell.name: cell for cell in self.cells}
         for one, other in self.compare:
             if one in by_name and other in by_name:
