@@ -6,11 +6,12 @@ import functools
 import hashlib
 import importlib.util
 import json
+import os
 import platform
 import re
 import shlex
 import subprocess
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import MISSING, asdict, fields, is_dataclass
 from importlib import metadata
@@ -129,6 +130,7 @@ def _named(options: Mapping[str, Any]) -> dict[str, Path]:
     return {name: path for name, path in found.items() if path.is_file()}
 
 
+@functools.cache
 def versions() -> dict[str, str]:
     """Return the versions of Python and of the installed packages of `PACKAGES`."""
     found = {"python": platform.python_version()}
@@ -146,7 +148,7 @@ def code_files() -> dict[str, str]:
     root = _package()
     return {
         path.relative_to(root).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()[:16]
-        for path in sorted(_package_files())
+        for path in sorted(Path(entry.path) for entry in _package_files())
     }
 
 
@@ -170,8 +172,8 @@ class Unchanged:
 
     @staticmethod
     def _now() -> tuple[int, int]:
-        files = [path.stat() for path in _package_files()]
-        return len(files), max(f.st_mtime_ns for f in files)
+        times = [entry.stat().st_mtime_ns for entry in _package_files()]
+        return len(times), max(times)
 
 
 @functools.cache
@@ -187,8 +189,13 @@ def _package() -> Path:
     return Path(golem.__path__[0])
 
 
-def _package_files() -> list[Path]:
-    return [path for path in _package().rglob("*") if path.is_file() and "__pycache__" not in path.parts]
+def _package_files(folder: Path | str | None = None) -> Iterator[os.DirEntry[str]]:
+    with os.scandir(folder or _package()) as entries:
+        for entry in entries:
+            if not entry.is_dir():
+                yield entry
+            elif entry.name != "__pycache__":
+                yield from _package_files(entry.path)
 
 
 def _git(*arguments: str) -> str | None:

@@ -203,7 +203,7 @@ def run_ladder(config: LadderConfig) -> LadderResult:
         cases = [] if rung.adaptive else [case_name(case) for case in rung.cases(lambda case: None)]
         wanted = {spec.key for spec in request.wanted({r.key: r.outcome for r in records})}
         if request.stop is not None:  # trials that ran beyond a decision depend on -j
-            records = [r for r in records if r.key in wanted or r.method not in config.method]
+            records = [r for r in records if r.key in wanted or r.index >= request.n or r.method not in config.method]
         records = folder.finish(records, config.method, cases)
         records = tuple(r for r in records if r.key in wanted)
         folder.state(command, provenance)

@@ -40,6 +40,8 @@ class Watchdog:
         """Run `batch` and answer it; its time counts from when the rung is loaded."""
         with suppress(Exception):  # `run_batch` meets it again
             rung_of(batch)
+        if not gc.get_freeze_count():
+            gc.freeze()  # what is loaded stays, and is not searched after each trial
         os.ftruncate(self._report, 0)
         os.lseek(self._report, 0, os.SEEK_SET)
         self._busy = True

@@ -18,9 +18,7 @@ from golem.errors import ConfigError, OutputError
 from golem.evaluation.base import case_name
 from golem.evaluation.harness.records import TrialRecord, artefacts, trial_name
 from golem.evaluation.harness.run_folder import read_facts
-from golem.evaluation.metrics.anytime import anytime_interval
 from golem.evaluation.metrics.results import trials_csv
-from golem.evaluation.metrics.statistics import wilson
 from golem.evaluation.metrics.summary import NO_MODULE, metric, summarise
 from golem.evaluation.metrics.tables import losses, metrics, number
 from golem.evaluation.metrics.text_table import short_names
@@ -108,13 +106,13 @@ def _board(study: Study, cell: CellResult, link: Any) -> dict[str, Any]:
     first, short, rows = cell.records[0], short_names(cell.methods), list[dict[str, Any]]()
     for method in cell.methods:
         won = [r.success for r in cell.of(method)]
-        interval = anytime_interval(won) if study.stop == "decided" else wilson(sum(won), len(won))
+        rate, interval = study.success(cell, method)
         lost = study.stages(cell, method)
         rows.append(
             {
                 "name": short[method],
                 "link": link(study, cell, method),
-                "rate": round(100 * sum(won) / len(won), 1),
+                "rate": round(100 * rate, 1),
                 "low": round(100 * interval.low, 1),
                 "width": round(100 * (interval.high - interval.low), 1),
                 "text": f"{sum(won)} of {len(won)}",
@@ -143,11 +141,10 @@ def _method_page(study: Study, cell: CellResult, method: str, out: Path) -> None
         says = f"trial {r.index}: {'success' if r.success else f'lost in {r.stage}'}"
         square = {"link": f"trials/{trial_name(r)}.html", "won": r.success, "says": says}
         cases.setdefault(case_name(r.case), []).append(square)
-    won = sum(r.success for r in rows)
     tables = [t for t in (losses(rows), metrics(summarise(rows, [method], compared=False), brief=True)) if t]
     common = {"study": study.title, "cell": cell.name}
-    interval = wilson(won, len(rows)).text(100.0)
-    says = f"{won} of {len(rows)} trials won, {100 * won / len(rows):.1f} % {interval} (Wilson, for a fixed n)."
+    rate, interval = study.success(cell, method)
+    says = f"{sum(r.success for r in rows)} of {len(rows)} trials won, {100 * rate:.1f} % {interval.text(100.0)}."
     page = render_page("method.html", {}, root="../../", name=name, says=says, cases=cases, tables=tables, **common)
     write_file(folder / back, page)
     around = [None, *(f"{trial_name(r)}.html" for r in rows), None]

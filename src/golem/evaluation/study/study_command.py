@@ -101,9 +101,11 @@ def run_cells(config: StudyConfig, study: StudyFile, cells: Sequence[Cell], out:
         result = run_ladder(ladder)
         if cell.best_n is not None and cell.best_n > (ladder.n or 0):
             best = sorted(result.summary.rows, key=lambda row: -row.rate)[:BEST]
-            chosen = {row.method for row in best}
-            methods = tuple(m for m in ladder.method if m in chosen)
-            run_ladder(replace(ladder, method=methods, n=cell.best_n))
+            methods = tuple(m for m in ladder.method if m in {row.method for row in best})
+            rule, sides = ladder.rule(), [[r for r in result.records if r.method == m] for m in methods]
+            both = min(map(len, sides))
+            if study.stop == "never" or rule.decided_after(*(rule.values(side[:both]) for side in sides)) is None:
+                run_ladder(replace(ladder, method=methods, n=cell.best_n))
         if study.stop == "decided":
             found = read_study(out)
             rejected = sum(d.p_holm <= ALPHA for d in decisions(found.pairs(), found.rule))

@@ -16,7 +16,7 @@ from golem.evaluation.harness.run_folder import finished_records, read_facts
 from golem.evaluation.metrics.anytime import anytime_interval
 from golem.evaluation.metrics.published import PAPER
 from golem.evaluation.metrics.sequential import Pair, StopRule, decisions, pair_of, pairs_of, sequential_tables
-from golem.evaluation.metrics.statistics import clustered, wilson
+from golem.evaluation.metrics.statistics import Interval, clustered, wilson
 from golem.evaluation.metrics.text_table import TextTable, short_names
 
 FACTS = "study.json"
@@ -108,17 +108,19 @@ class Study:
         rows = cell.of(method)
         if not rows:
             return EMPTY
-        cases = len({case_name(r.case) for r in rows})
-        won, scenes = [r.success for r in rows], dict[int, list[bool]]()
-        for r in rows:
+        n, planned = len(rows), cell.planned * len({case_name(r.case) for r in rows})
+        rate, interval = self.success(cell, method)
+        return f"{100 * rate:.1f} {interval.text(100.0)} ({f'{n} of {planned}' if n < planned else n})"
+
+    def success(self, cell: CellResult, method: str) -> tuple[float, Interval]:
+        """Return the rate of a method that has trials, with its interval: what shares a scene counts as one."""
+        scenes: dict[int, list[bool]] = {}
+        for r in cell.of(method):
             scenes.setdefault(r.index, []).append(r.success)
-        if cases > 1:
-            interval = clustered(list(scenes.values()))
-        else:
-            interval = anytime_interval(won) if self.stop == "decided" else wilson(sum(won), len(won))
-        planned = cell.planned * cases
-        count = f"{len(won)} of {planned}" if len(won) < planned else f"{len(won)}"
-        return f"{100 * sum(won) / len(won):.1f} {interval.text(100.0)} ({count})"
+        rate = sum(map(sum, scenes.values())) / sum(map(len, scenes.values()))
+        if self.stop == "decided":
+            return rate, anytime_interval([sum(one) / len(one) for one in scenes.values()])
+        return rate, clustered(list(scenes.values()))
 
     def pairs(self) -> list[Pair]:
         """Return every comparison of the study: methods within a cell, and a method in two cells."""
