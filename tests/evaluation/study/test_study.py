@@ -12,13 +12,17 @@ from typing import Any
 import pytest
 
 from golem.errors import ConfigError, GolemError, OutputError
+from golem.evaluation.base import TrialOutcome, TrialSpec
 from golem.evaluation.harness.ladder import LadderConfig
-from golem.evaluation.harness.records import read_records
+from golem.evaluation.harness.records import Provenance, read_records
+from golem.evaluation.metrics.anytime import anytime_interval
+from golem.evaluation.metrics.sequential import StopRule
+from golem.evaluation.metrics.statistics import wilson
 from golem.evaluation.report.site import PublishConfig, run_publish
 from golem.evaluation.study.plan import simulated, smallest_difference
 from golem.evaluation.study.study_command import StudyConfig, run_study_command
 from golem.evaluation.study.study_file import read_study_file
-from golem.evaluation.study.study_folder import read_study
+from golem.evaluation.study.study_folder import CellResult, Study, read_study
 
 pytest.importorskip("jinja2", reason="the extra report is not installed")
 FILE = """
@@ -183,3 +187,31 @@ def test_a_plan_finds_less_with_fewer_trials() -> None:
     assert 0.1 < many < few < 0.7
     a, b = simulated(0.2, 1000)
     assert a.mean() - b.mean() == pytest.approx(0.2, abs=0.01)
+
+
+def test_the_share_of_a_search_is_not_quoted(fake: Callable[..., LadderConfig], tmp_path: Path) -> None:
+    p = Provenance({"weak": {}}, {}, "abc", {})
+    records = [
+        p.record(TrialSpec("climb", "weak", "ideal", 0, i, case={"side": "left", "level": level}), won)
+        for i in range(2)
+        for level, won in ((1.0, TrialOutcome(True, "done")), (3.0, TrialOutcome(False, "fall")))
+    ]
+    cell = CellResult("levels", tmp_path, 2, tuple(records))
+    study = Study("few", "Few", "", "", "", "never", StopRule(), (), (cell,))
+    assert study.rates().rows == (("levels", "own table"),)
+    assert study.pairs() == [] and study.comparisons() == []
+
+
+def test_what_shares_a_scene_counts_as_one(fake: Callable[..., LadderConfig], tmp_path: Path) -> None:
+    p = Provenance({"good": {}}, {}, "abc", {})
+    won = TrialOutcome(True, "done")
+    records = [
+        p.record(TrialSpec("fake", "good", "ideal", 0, i, case={"thing": thing}), won)
+        for i in range(20)
+        for thing in ("mug", "bowl")
+    ]
+    cell = CellResult("things", tmp_path, 20, tuple(records))
+    study = Study("few", "Few", "", "", "", "never", StopRule(), (), (cell,))
+    assert study.success(cell, "good") == (1.0, wilson(20, 20)) and study.rates().rows[0][1] == "100.0 [83.9, 100] (40)"
+    early = replace(study, stop="decided").success(cell, "good")[1]
+    assert early == anytime_interval([1.0] * 20)

@@ -161,14 +161,13 @@ def sequential_tables(rates: Mapping[str, Array], found: Sequence[Decision], rul
         for name, x in rates.items()
         if len(x)
     ]
-    tables = [
-        TextTable(
-            f"{rule.score.replace('_', ' ').capitalize() or 'Success'} at any time",
-            ("method", "n", "mean [%]", "95 %, n fixed in advance", "95 %, at any time"),
-            tuple(rows),
-            "At any time: betting confidence sequence (Waudby-Smith and Ramdas 2024), valid wherever a run stopped.",
-        )
-    ]
+    success = TextTable(
+        f"{rule.score.replace('_', ' ').capitalize() or 'Success'} at any time",
+        ("method", "n", "mean [%]", "95 %, n fixed in advance", "95 %, at any time"),
+        tuple(rows),
+        "At any time: betting confidence sequence (Waudby-Smith and Ramdas 2024), valid wherever a run stopped.",
+    )
+    tables = [success] if rows else []
     if found:
         short = short_names(name for d in found for name in (d.a, d.b))
         lines = [

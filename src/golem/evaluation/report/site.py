@@ -120,7 +120,8 @@ def _board(study: Study, cell: CellResult, link: Any) -> dict[str, Any]:
             }
         )
     options = ", ".join(f"{k} {v}" for k, v in first.options.items() if v)
-    says = f"Rung {first.rung}, profile {first.profile}, seed {first.seed}{', ' + options if options else ''}."
+    search = " The next case follows from results, so the share of the trials says nothing." if cell.adaptive else ""
+    says = f"Rung {first.rung}, profile {first.profile}, seed {first.seed}{', ' + options if options else ''}.{search}"
     return {"name": cell.name, "says": says, "methods": sorted(rows, key=lambda row: -row["rate"])}
 
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import itertools
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from golem.errors import ConfigError
-from golem.evaluation.base import DONE, case_name, rung_class
+from golem.evaluation.base import DONE, RUNGS, case_name, make_rung, rung_class
 from golem.evaluation.harness.records import TrialRecord
 from golem.evaluation.harness.run_folder import finished_records, read_facts
 from golem.evaluation.metrics.anytime import anytime_interval
@@ -42,6 +42,11 @@ class CellResult:
     def methods(self) -> tuple[str, ...]:
         """The methods, in the order of the records."""
         return tuple(dict.fromkeys(r.method for r in self.records))
+
+    @property
+    def adaptive(self) -> bool:
+        """Whether its cases follow from results, so that a share of its trials says nothing."""
+        return rung_class(self.records[0].rung).adaptive
 
     def of(self, method: str) -> list[TrialRecord]:
         """Return the trials of a method."""
@@ -108,6 +113,8 @@ class Study:
         rows = cell.of(method)
         if not rows:
             return EMPTY
+        if cell.adaptive:
+            return "own table"
         n, planned = len(rows), cell.planned * len({case_name(r.case) for r in rows})
         rate, interval = self.success(cell, method)
         return f"{100 * rate:.1f} {interval.text(100.0)} ({f'{n} of {planned}' if n < planned else n})"
@@ -126,7 +133,7 @@ class Study:
         """Return every comparison of the study: methods within a cell, and a method in two cells."""
         found: list[Pair] = []
         for cell in self.cells:
-            if not rung_class(cell.records[0].rung).adaptive:
+            if not cell.adaptive:
                 own = pairs_of(cell.records, cell.methods, self.rule)
                 found += [(f"{cell.name}: {a}", b, one, other) for a, b, one, other in own]
         by_name = {cell.name: cell for cell in self.cells}
@@ -139,14 +146,22 @@ class Study:
         return found
 
     def comparisons(self) -> list[TextTable]:
-        """Return what holds at any time, with Holm's adjustment over the whole study."""
+        """Return what holds at any time, with Holm's adjustment over the whole study; first, adaptive rungs' own."""
+        own = [
+            replace(table, title=f"{cell.name}: {table.title}")
+            for cell in self.cells
+            if cell.adaptive
+            for table in make_rung(RUNGS[cell.records[0].rung], cell.records[0].options).tables(
+                {method: [(r.spec, r.outcome) for r in cell.of(method)] for method in cell.methods}
+            )
+        ]
         rates = {
             f"{cell.name}: {method}": self.rule.values(cell.of(method))
             for cell in self.cells
             for method in cell.methods
-            if len({case_name(r.case) for r in cell.of(method)}) == 1
+            if not cell.adaptive and len({case_name(r.case) for r in cell.of(method)}) == 1
         }
-        return sequential_tables(rates, decisions(self.pairs(), self.rule), self.rule)
+        return [*own, *sequential_tables(rates, decisions(self.pairs(), self.rule), self.rule)]
 
     def caption(self) -> str:
         """Return n, seeds, profiles and commit in a sentence."""
