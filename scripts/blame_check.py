@@ -17,7 +17,7 @@ import tyro
 from tyro.conf import arg
 
 from golem.errors import unknown_name
-from golem.evaluation.blame.blame_command import BlameConfig, Trials, Verdict, judge
+from golem.evaluation.blame.blame_command import BlameConfig, BlameVerdict, Trials, judge
 from golem.evaluation.blame.oracles import ALTERED
 from golem.evaluation.harness.ladder import LadderConfig, run_ladder
 from golem.evaluation.harness.records import read_records
@@ -108,7 +108,7 @@ class BlameCheck:
     """Processes."""
 
 
-def verdict(config: BlameCheck, rung: str, name: str = "", size: int = 0) -> tuple[Verdict, Path]:
+def verdict(config: BlameCheck, rung: str, name: str = "", size: int = 0) -> tuple[BlameVerdict, Path]:
     """Run the ladder of one stack, and return who lost its trials."""
     out = config.out / (f"{name}-{size}" if name else f"sound-{rung}")
     method = METHODS.get(rung, "visual_servo")
@@ -152,7 +152,7 @@ def main(config: BlameCheck) -> None:
         print(f"{words}: {k} of {n}{f', {wilson(k, n).text(100)} %' if n else ''}")
 
 
-def _row(name: str, right: str, found: Verdict, named: str = "-") -> tuple[str, ...]:
+def _row(name: str, right: str, found: BlameVerdict, named: str = "-") -> tuple[str, ...]:
     shares = {k: v for k, v in found.shares.items() if v.value}
     parts = " ".join(f"{k} {100 * v.value:+.0f}" for k, v in sorted(shares.items(), key=lambda kv: -kv[1].value))
     s, total = found.strata, found.total

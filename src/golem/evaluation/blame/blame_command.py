@@ -56,7 +56,7 @@ class BlameConfig:
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class BlameVerdict:
     """What was found of one method of a run.
 
     Attributes:
@@ -183,7 +183,7 @@ def name_of(exchanged: Coalition) -> str:
     return "+".join(sorted(exchanged, key=list(ORACLES).index))
 
 
-def judge(trials: Trials, method: str, names: Sequence[str], config: BlameConfig, rung: str) -> Verdict:
+def judge(trials: Trials, method: str, names: Sequence[str], config: BlameConfig, rung: str) -> BlameVerdict:
     """Run what is needed of one method, and say what each exchange is worth.
 
     An exchange that wins no lost trial alone, and is not missed where all together win one, is not paired.
@@ -226,7 +226,7 @@ def judge(trials: Trials, method: str, names: Sequence[str], config: BlameConfig
     shares = {name: points(strata, {key: each[key][name] for key in keys}) for name in matter}
     pairs = {name_of(who): effect(who) for who in chosen if len(who) == 2}
     total = effect(frozenset(matter))
-    return Verdict(rung, method, strata, singles, pairs, len(wins(everything)), shares, total)
+    return BlameVerdict(rung, method, strata, singles, pairs, len(wins(everything)), shares, total)
 
 
 def run_blame(config: BlameConfig) -> int:
@@ -238,7 +238,7 @@ def run_blame(config: BlameConfig) -> int:
     """
     if config.n < 1 or config.harm < 0:
         raise ConfigError("-n is 1 or more, and --harm 0 or more.")
-    verdicts: list[Verdict] = []
+    verdicts: list[BlameVerdict] = []
     with closing(make_executor(config.executor, config.j)) as executor:
         for run in config.runs:
             records = read_records(run / "trials.jsonl")
@@ -263,7 +263,7 @@ def run_blame(config: BlameConfig) -> int:
     return len(verdicts)
 
 
-def budget(verdicts: Sequence[Verdict]) -> TextTable:
+def budget(verdicts: Sequence[BlameVerdict]) -> TextTable:
     """Return the error budget from rung to rung, of each method: success, and each module's share of what is lost."""
     names = list(dict.fromkeys(name for one in verdicts for name in one.shares))
     rows: list[tuple[str, ...]] = []
