@@ -11,7 +11,7 @@ from golem.middleware.bus import Bus, News
 from golem.types import ARMS, TICK, LowCommand
 
 RATE = 0.5
-"""How fast the weight follows [1/s], as xr_teleoperate lets go: arms that differ by 4 rad move by 4 mrad a tick."""
+"""How fast the weight follows what is asked for [1/s], as xr_teleoperate lets go: 4 rad go by 4 mrad a tick."""
 SILENCE = 0.25
 """Time without a command after which the arms go back [s] [own: the examples send one each 20 ms]."""
 LET_GO = 1.0
