@@ -17,8 +17,8 @@ import numpy as np
 
 from golem.agent.audit import AuditLog, read_audit
 from golem.agent.desk import Call, Desk
-from golem.agent.rules import Region, Rules, ToolRule
 from golem.agent.stack_body import StackBody
+from golem.agent.tool_rules import Region, Rules, ToolRule
 from golem.interfaces import topics
 from golem.runtime.lockstep import LockstepRunner, build
 from golem.stack import load_stack

@@ -15,13 +15,13 @@ from tyro.conf import OmitArgPrefixes, Positional, arg
 
 from golem.agent.audit import AuditLog
 from golem.agent.body import Body
-from golem.agent.console import HELP, Operator, terminal
+from golem.agent.console import HELP, ToolOperator, terminal
 from golem.agent.desk import Desk
 from golem.agent.domain_body import DomainBody
 from golem.agent.mcp_server import modules, serve_http, serve_stdio
-from golem.agent.planner import Planner, replay
-from golem.agent.rules import load_rules
+from golem.agent.sentences import SentencePlanner, replay
 from golem.agent.stack_body import StackBody
+from golem.agent.tool_rules import load_rules
 from golem.dashboard.live import LiveView
 from golem.errors import ConfigError
 from golem.middleware.dds.domain import DdsConfig
@@ -100,7 +100,7 @@ def run_mcp(config: McpConfig) -> bool:
             paced = config.paced or config.view
             body = StackBody(running, robot, paced, None if config.record is None else show)
         desk = Desk(body, rules, log)
-        operator = Operator(desk, _say, (lambda text: None) if view is None else view.panel.ask)
+        operator = ToolOperator(desk, _say, (lambda text: None) if view is None else view.panel.ask)
         if view is not None:
             view.decide = operator.decide
         operator.listen(terminal() if served and config.port is None else sys.stdin)
@@ -117,7 +117,7 @@ def _use(desk: Desk, config: McpConfig) -> bool:
         for tool, then, now in rows:
             print(f"{tool:12s} {'did' if then else 'did not'} succeed, {'does' if now else 'does not'} now")
         return all(then == now for _, then, now in rows)
-    report = Planner(desk.call).do(config.do or "")
+    report = SentencePlanner(desk.call).do(config.do or "")
     print(report.text)
     return report.done
 

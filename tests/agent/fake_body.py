@@ -10,9 +10,9 @@ from typing import Any, Literal
 import numpy as np
 
 from golem.agent.audit import AuditLog, read_audit
-from golem.agent.body import Moment, Picture
+from golem.agent.body import BodyMotion, Picture
 from golem.agent.desk import Desk
-from golem.agent.rules import Rules
+from golem.agent.tool_rules import Rules
 from golem.errors import ConfigError
 from golem.interfaces.payloads import Feedback
 from golem.options import require
@@ -98,9 +98,9 @@ class FakeBody:
     def stop_motors(self) -> None:
         self.stopped += 1
 
-    def moment(self) -> Moment:
+    def moment(self) -> BodyMotion:
         v = 0.5 if self.busy and self._moves else 0.0
-        return Moment(self.x, 0.0, (v, 0.0), np.full((2, 3), self.force))
+        return BodyMotion(self.x, 0.0, (v, 0.0), np.full((2, 3), self.force))
 
     def in_odom(self, frame: str, x: float, y: float) -> tuple[float, float] | None:
         return (self.x + x, y) if frame == "base_link" else (x, y) if frame == "odom" else None

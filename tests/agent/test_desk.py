@@ -10,7 +10,7 @@ import pytest
 from tests.agent.fake_body import HOSTILE, Rig
 
 from golem.agent.desk import Answer, Call
-from golem.agent.rules import Region, Rules, ToolRule
+from golem.agent.tool_rules import Region, Rules, ToolRule
 
 FREE = Rules(default="free", calls=1000)
 

@@ -11,7 +11,7 @@ from tests.runtime.live.conftest import Live, live  # noqa: F401 - a fixture
 from golem.agent.audit import AuditLog
 from golem.agent.desk import Answer, Call, Desk
 from golem.agent.domain_body import DomainBody
-from golem.agent.rules import Rules
+from golem.agent.tool_rules import Rules
 from golem.types import TICK
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from golem.agent.audit import AuditLog, read_audit
-from golem.agent.rules import Region, Rules, ToolRule, load_rules
+from golem.agent.tool_rules import Region, Rules, ToolRule, load_rules
 from golem.errors import ConfigError, GolemError
 
 

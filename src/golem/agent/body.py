@@ -30,7 +30,7 @@ MAP_CELLS = 120
 
 
 @dataclass(frozen=True, slots=True)
-class Moment:
+class BodyMotion:
     """How the robot moves now.
 
     Attributes:
@@ -100,7 +100,7 @@ class Body(ABC):
     def step(self) -> None:
         """Let a little time pass."""
 
-    def moment(self) -> Moment | None:
+    def moment(self) -> BodyMotion | None:
         """Return how the robot moves now; None before it reports."""
         base, state = self._bus.latest(topics.BASE), self._bus.latest(topics.LOW_STATE)
         if base is None or state is None:
@@ -108,7 +108,7 @@ class Body(ABC):
         forces = np.array([self._force.wrench(side, state.q[UPPER], state.tau[UPPER])[:3] for side in SIDES])
         x, y = base.T_odom_base[:2, 3].tolist()
         vx, vy = base.velocity[:2].tolist()
-        return Moment(x, y, (vx, vy), forces)
+        return BodyMotion(x, y, (vx, vy), forces)
 
     def in_odom(self, frame: str, x: float, y: float) -> tuple[float, float] | None:
         """Return a place given in a frame, in odom [m]; None where that is not known."""

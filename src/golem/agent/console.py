@@ -13,7 +13,7 @@ TERMINAL = Path("/dev/tty")
 HELP = "Answer 'yes NUMBER' or 'no NUMBER'; 'stop' cancels what runs, 'stop motors' has the safety gate stop the robot."
 
 
-class Operator:
+class ToolOperator:
     """Asks and listens."""
 
     def __init__(self, desk: Desk, tell: Callable[[str], None], show: Callable[[str | None], None]) -> None:

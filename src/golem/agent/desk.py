@@ -18,8 +18,8 @@ import numpy as np
 
 from golem.agent.answers import answer, refusal, words
 from golem.agent.audit import AuditLog
-from golem.agent.body import Body, Moment, Picture
-from golem.agent.rules import Rules
+from golem.agent.body import Body, BodyMotion, Picture
+from golem.agent.tool_rules import Rules
 from golem.errors import GolemError, shorten, unknown_name
 from golem.interfaces.payloads import Feedback
 from golem.package_data import load_data
@@ -276,7 +276,7 @@ class Desk:
             data |= {"stage": "rules", "slot": None, "reason": words(self._over, False)}
         self._answer(call, Answer(data))
 
-    def _excess(self, moment: Moment) -> str:
+    def _excess(self, moment: BodyMotion) -> str:
         self._felt.append(moment.forces)
         force, mean = 0.0, np.mean(self._felt, axis=0)
         if len(self._felt) == FELT:

@@ -7,7 +7,7 @@ from typing import Any
 
 from golem.agent.answers import answer_schema
 from golem.agent.desk import OWN, STILL, Desk
-from golem.agent.rules import ToolRule
+from golem.agent.tool_rules import ToolRule
 from golem.skills.spec import Schema, SkillSpec
 
 _ASKS = {"free": "", "ask": " The operator is asked first.", "never": " The rules do not allow it."}

@@ -52,19 +52,6 @@ class ArmCommand:
 
 
 @dataclass(frozen=True, slots=True)
-class ArmSdkCommand:
-    """What a program of the vendor's wants of the 14 motors of both arms.
-
-    Attributes:
-        weight: how much of it is asked for, 0 to 1; the rest is the stack's own.
-        motors: (5, 14) q [rad], dq [rad/s], tau [N m], kp, kd.
-    """
-
-    weight: float
-    motors: Array
-
-
-@dataclass(frozen=True, slots=True)
 class JointTrajectory:
     """Where torso and arms are to be, and when.
 

@@ -15,8 +15,9 @@ import numpy as np
 
 from golem.interfaces import images, lidar_convert, topics
 from golem.interfaces import ros_convert as convert
-from golem.interfaces.payloads import ArmSdkCommand, Exposure, LegCommand
+from golem.interfaces.payloads import Exposure, LegCommand
 from golem.interfaces.rows import ActionRow, Role, ServiceRow, TopicRow
+from golem.interfaces.unitree_api import ArmSdkCommand
 from golem.middleware.dds.base import CALLS, DEFAULT, LATCHED, SENSOR, Payload, Qos
 from golem.middleware.ros.msgs.rosgraph_msgs import Clock
 from golem.middleware.ros.msgs.sensor_msgs import CameraInfo
@@ -280,9 +281,9 @@ TOPICS: tuple[TopicRow, ...] = (
           "Sticks of the remote control: velocities, as on /cmd_vel. Its keys do nothing here.",
           topics.TWIST, None, decode_sticks),
     TopicRow("/arm_sdk", "unitree_hg/msg/LowCmd", "user", ("stack",), LOW, None, "",
-          "What a program of the vendor's wants of motors 13 to 26, the legs staying ours; q of slot 27 is its weight, "
-          "0 to 1, which the arms follow by 0.5 a second, also back when it falls silent. Ignored while a skill runs "
-          "or the gate is shut; who had the arms then lets go first: weight 0, or nothing for 1 s.",
+          "What a program of the vendor's wants of motors 13 to 26; the legs stay ours. The q of slot 27 is its weight "
+          "from 0 to 1. The arms follow that by 0.5 a second, also back when the program falls silent. Ignored while a "
+          "skill runs or the gate is shut; who had the arms then lets go first: weight 0, or nothing for 1 s.",
           topics.ARM_SDK, None, decode_arm_sdk),
     TopicRow("/cmd_height", "std_msgs/msg/Float64", "user", ("stack",), DEFAULT, None, "",
           "Height of base_link over the ground to stand at [m]; NaN is the legs' own. It holds until the next one, a "

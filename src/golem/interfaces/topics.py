@@ -7,6 +7,7 @@ from functools import cache
 from golem.interfaces import nav_payloads, payloads
 from golem.interfaces.lidar import ExternalOdometry, LidarImu, LidarScan
 from golem.interfaces.memory_payloads import MemoryStatus, RememberedPlaces
+from golem.interfaces.unitree_api import ArmSdkCommand
 from golem.middleware.bus import Topic
 from golem.middleware.wire.api import ApiRequest, Response, request_topic, response_topic
 from golem.types import BaseEstimate, HandCommand, HandState, LowCommand, LowState, PalmTargets, RgbdImage, Side, Twist
@@ -31,7 +32,7 @@ ARM_TRAJECTORY = Topic("arm_trajectory", payloads.JointTrajectory)
 """From the running skill; it holds until palm targets, or another one, come."""
 ARM_COMMAND = Topic("arm_command", payloads.ArmCommand)
 """From the upper-body controller."""
-ARM_SDK = Topic("arm_sdk", payloads.ArmSdkCommand)
+ARM_SDK = Topic("arm_sdk", ArmSdkCommand)
 """From a program of the vendor's."""
 LEG_COMMAND = Topic("leg_command", payloads.LegCommand)
 """From the lower-body controller."""

@@ -8,6 +8,21 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from golem.errors import unknown_name
+from golem.types import Array
+
+
+@dataclass(frozen=True, slots=True)
+class ArmSdkCommand:
+    """What a program of the vendor's wants of the 14 motors of both arms.
+
+    Attributes:
+        weight: how much of it is asked for, 0 to 1; the rest is the stack's own.
+        motors: (5, 14) q [rad], dq [rad/s], tau [N m], kp, kd.
+    """
+
+    weight: float
+    motors: Array
+
 
 OK = 0
 SEND_FAILED = 3102

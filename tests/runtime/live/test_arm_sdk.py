@@ -9,8 +9,8 @@ import pytest
 from tests.runtime.live.conftest import Live
 
 from golem.interfaces import topics
-from golem.interfaces.payloads import ArmSdkCommand
 from golem.interfaces.public import WEIGHT, decode_arm_sdk, decode_sticks
+from golem.interfaces.unitree_api import ArmSdkCommand
 from golem.middleware.bus import Bus
 from golem.middleware.dds.base import Qos
 from golem.middleware.ros.msgs.unitree_go import WirelessController

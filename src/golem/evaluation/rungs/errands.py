@@ -15,9 +15,9 @@ import numpy as np
 
 from golem.agent.audit import AuditLog
 from golem.agent.desk import Desk
-from golem.agent.planner import Planner, Report
-from golem.agent.rules import Rules
+from golem.agent.sentences import ErrandReport, SentencePlanner
 from golem.agent.stack_body import StackBody
+from golem.agent.tool_rules import Rules
 from golem.errors import unknown_name
 from golem.evaluation.base import DONE, Case, Results, TrialSpec
 from golem.evaluation.episodes.counter_watch import LIFTED, CounterWatch, ErrandWatch
@@ -200,12 +200,12 @@ class ErrandsRung(KitchenRung[ErrandsOptions]):
 
     def _done(
         self, words: str, running: LockstepRunner, robot: MujocoRobot, watch: CounterWatch | None
-    ) -> tuple[Report, SkillResult]:
+    ) -> tuple[ErrandReport, SkillResult]:
         """Have the planner do what the words say; return what it reports, as a result too."""
         start = running.executor.t
         with TemporaryDirectory() as folder, closing(AuditLog(Path(folder) / "audit.jsonl")) as log:
             desk = Desk(StackBody(running, robot, watch=watch), RULES, log)
-            report = Planner(desk.call).do(words)
+            report = SentencePlanner(desk.call).do(words)
         stage = DONE if report.done else "errand"
         timings = {"total": running.executor.t - start}
         return report, SkillResult(report.done, stage, None if report.done else "skill", report.text, timings)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from golem.interfaces import topics
-from golem.interfaces.payloads import ArmSdkCommand
+from golem.interfaces.unitree_api import ArmSdkCommand
 from golem.middleware.bus import Bus, News
 from golem.types import ARMS, TICK, LowCommand
 

@@ -10,8 +10,8 @@ import pytest
 from tests.agent.fake_body import Rig
 
 from golem.agent.answers import words
-from golem.agent.planner import Planner, replay
-from golem.agent.rules import Rules
+from golem.agent.sentences import SentencePlanner, replay
+from golem.agent.tool_rules import Rules
 from golem.errors import ConfigError
 from golem.evaluation.rungs.errands import SUITE
 
@@ -43,7 +43,7 @@ class Robot:
 
 def said(sentence: str, tight: int = 0) -> tuple[Any, list[tuple[str, Mapping[str, Any]]]]:
     robot = Robot(tight)
-    return Planner(robot).do(sentence), robot.calls
+    return SentencePlanner(robot).do(sentence), robot.calls
 
 
 def test_a_thing_is_brought_to_where_another_was() -> None:

@@ -39,7 +39,7 @@ EXAMPLES = "'put the mug where the bowl was yesterday', 'take out the three loos
 
 
 @dataclass
-class Report:
+class ErrandReport:
     """What came of an errand.
 
     Attributes:
@@ -62,14 +62,14 @@ class Spot(NamedTuple):
     z: float
 
 
-class Planner:
+class SentencePlanner:
     """Does errands by `use`."""
 
     def __init__(self, use: Use) -> None:
         """Use tools by `use`."""
         self._use = use
 
-    def do(self, words: str) -> Report:
+    def do(self, words: str) -> ErrandReport:
         """Do what a sentence says.
 
         Raises:
@@ -100,48 +100,50 @@ class Planner:
         best = max(places, key=lambda p: p["first_seen"]) if when == "at first" else places[0]
         return Spot(best["x"], best["y"], best["z"])
 
-    def _fetch(self, thing: str, to: Spot | None) -> Report:
+    def _fetch(self, thing: str, to: Spot | None) -> ErrandReport:
         goal = {"text": thing} if to is None else {"text": thing, "to": [to.x, to.y]}
         said = self._use("fetch", goal)
-        return Report(said["success"], said["reason"]["text"], {} if to is None else {"place": list(to)})
+        return ErrandReport(said["success"], said["reason"]["text"], {} if to is None else {"place": list(to)})
 
-    def _to_where(self, thing: str, other: str, tense: str, when: str = "") -> Report:
+    def _to_where(self, thing: str, other: str, tense: str, when: str = "") -> ErrandReport:
         spot = self._recall(other, tense, when)
-        return Report(False, f"Nothing is remembered of the {other}.") if spot is None else self._fetch(thing, spot)
+        return (
+            ErrandReport(False, f"Nothing is remembered of the {other}.") if spot is None else self._fetch(thing, spot)
+        )
 
-    def _back(self, thing: str, when: str = "") -> Report:
+    def _back(self, thing: str, when: str = "") -> ErrandReport:
         return self._to_where(thing, thing, "was", when)
 
-    def _beside(self, thing: str, way: str, other: str, cm: str = str(BESIDE)) -> Report:
+    def _beside(self, thing: str, way: str, other: str, cm: str = str(BESIDE)) -> ErrandReport:
         spot = self._recall(other, "is")
         if spot is None:
-            return Report(False, f"Nothing is remembered of the {other}.")
+            return ErrandReport(False, f"Nothing is remembered of the {other}.")
         aside = 0.01 * float(cm) * (1.0 if way == "left" else -1.0)
         return self._fetch(thing, spot._replace(y=spot.y + aside))
 
-    def _where(self, thing: str, tense: str, when: str = "") -> Report:
+    def _where(self, thing: str, tense: str, when: str = "") -> ErrandReport:
         spot = self._recall(thing, tense, when)
         if spot is None:
-            return Report(False, f"Nothing is remembered of the {thing}.")
-        return Report(
+            return ErrandReport(False, f"Nothing is remembered of the {thing}.")
+        return ErrandReport(
             True, f"The {thing} {tense} at ({spot.x:.2f}, {spot.y:.2f}, {spot.z:.2f}).", {"place": list(spot)}
         )
 
-    def _count(self, thing: str) -> Report:
+    def _count(self, thing: str) -> ErrandReport:
         said = self._use("look", {"camera": "head", "labels": [thing]})
         count = sum(one["score"] >= SURE for one in said.get("found", []))
-        return Report(said["success"], f"{count} of {thing}.", {"count": count})
+        return ErrandReport(said["success"], f"{count} of {thing}.", {"count": count})
 
-    def _bring(self, thing: str) -> Report:
+    def _bring(self, thing: str) -> ErrandReport:
         return self._fetch(thing, None)
 
-    def _find(self, thing: str) -> Report:
+    def _find(self, thing: str) -> ErrandReport:
         said = self._use("search", {"text": thing})
         places = (said.get("value") or {}).get("places", [])
         facts = {"place": [places[0][axis] for axis in "xyz"]} if places else {}
-        return Report(said["success"] and bool(places), said["reason"]["text"], facts)
+        return ErrandReport(said["success"] and bool(places), said["reason"]["text"], facts)
 
-    def _screws(self, number: str = "all", side: str = "") -> Report:
+    def _screws(self, number: str = "all", side: str = "") -> ErrandReport:
         """Pick what is seen on a side, the nearest to the middle first, until so many are out."""
         state = self._use("read", {"resource": "state"}).get("state", {})
         base = state.get("base", {"x": 0.0, "y": 0.0, "yaw": 0.0})
@@ -164,7 +166,9 @@ class Planner:
                 ends.setdefault(tried[-1]["outcome"]["text"], []).append([tried[-1]["x"], tried[-1]["y"]])
         tight = ends.get("tight", [])
         text = f"{taken} screws are out" + "".join(f"; {len(places)} {end}" for end, places in ends.items())
-        return Report(taken >= wanted, f"{text}.", {"taken": taken, "tight": tight, "jammed": ends.get("jammed", [])})
+        return ErrandReport(
+            taken >= wanted, f"{text}.", {"taken": taken, "tight": tight, "jammed": ends.get("jammed", [])}
+        )
 
 
 def replay(file: Path, use: Use) -> Iterator[tuple[str, bool, bool]]:
