@@ -164,7 +164,7 @@ class SentencePlanner:
             tried = (said.get("value") or {}).get("tried", [])
             if not said["success"] and tried:
                 ends.setdefault(tried[-1]["outcome"]["text"], []).append([tried[-1]["x"], tried[-1]["y"]])
-        tight = ends.get("tight", [])
+        told = {"tight": ends.get("tight", []), "jammed": ends.get("jammed", [])}
         text = f"{taken} screws are out" + "".join(f"; {len(places)} {end}" for end, places in ends.items())
         return ErrandReport(
             taken >= wanted, f"{text}.", {"taken": taken, "tight": tight, "jammed": ends.get("jammed", [])}
