@@ -166,9 +166,7 @@ class SentencePlanner:
                 ends.setdefault(tried[-1]["outcome"]["text"], []).append([tried[-1]["x"], tried[-1]["y"]])
         told = {"tight": ends.get("tight", []), "jammed": ends.get("jammed", [])}
         text = f"{taken} screws are out" + "".join(f"; {len(places)} {end}" for end, places in ends.items())
-        return ErrandReport(
-            taken >= wanted, f"{text}.", {"taken": taken, "tight": tight, "jammed": ends.get("jammed", [])}
-        )
+        return ErrandReport(taken >= wanted, f"{text}.", {"taken": taken, **told})
 
 
 def replay(file: Path, use: Use) -> Iterator[tuple[str, bool, bool]]:
