@@ -64,7 +64,7 @@ def test_no_rules_at_all_ask_for_everything_that_moves() -> None:
         load_rules(Path("/nowhere/rules.yaml"))
 
 
-def test_the_log_goes_on_and_shows_what_was_changed(tmp_path: Path) -> None:
+def test_the_log_goes_on_and_what_is_none_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "a" / "audit.jsonl"
     for run in range(2):
         log = AuditLog(file, bag=f"bag_{run}")
@@ -74,11 +74,8 @@ def test_the_log_goes_on_and_shows_what_was_changed(tmp_path: Path) -> None:
     assert [e["event"] for e in entries] == ["begin", "call"] * 2 and entries[2]["bag"] == "bag_1"
     assert entries[1]["arguments"]["characters"] > 10_000 and "x" * 100 not in file.read_text()
     lines = file.read_text().splitlines()
-    for wrong in (lines[:1] + lines[2:], [lines[0], lines[1].replace("1.5", "1.6"), *lines[2:]], ["{}"], ["[]"], ["x"]):
-        file.write_text("\n".join(wrong) + "\n")
-        with pytest.raises(GolemError, match="Line"):
-            list(read_audit(file))
-        with pytest.raises(GolemError):
-            AuditLog(file)
-    file.write_text("\n".join(lines) + "\n")
-    assert json.loads(file.read_text().splitlines()[0])["before"] == ""
+    assert json.loads(lines[0])["bag"] == "bag_0"
+    for wrong in ("{}", "[]", "x", "[1]"):
+        file.write_text(f"{lines[0]}\n{wrong}\n")
+        with pytest.raises(GolemError, match="after"):
+            read_audit(file)

@@ -23,7 +23,8 @@ from golem.agent.tool_rules import Rules
 from golem.errors import GolemError, shorten, unknown_name
 from golem.interfaces.payloads import Feedback
 from golem.package_data import load_data
-from golem.skills.spec import Schema, SkillSpec, read_fields
+from golem.runtime.goal_parser import read_fields
+from golem.skills.spec import Schema, SkillSpec
 from golem.types import Array
 
 LARGEST = 1 << 16

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 from golem.agent.audit import read_audit
 from golem.errors import ConfigError, shorten
+from golem.package_data import load_data
 
 Use = Callable[[str, Mapping[str, Any]], dict[str, Any]]
 """Has a tool used with arguments, and returns its answer; `Desk.call`, or a client's."""
@@ -20,20 +21,8 @@ BESIDE = 20
 """How far beside another thing is, where nobody says [cm]."""
 SURE = 0.5
 """Score from which on a thing is counted."""
-_THING = r"(?P<thing>[a-z]+)"
-_OTHER = r"(?P<other>[a-z]+)"
-_WHEN = r"(?: (?P<when>yesterday|at first|before|\d+ (?:second|minute|hour|day)s? ago))?"
-SENTENCES: dict[str, str] = {
-    rf"(?:put|move|bring|set) the {_THING} (?:to )?where the {_OTHER} (?P<tense>is|was|stood){_WHEN}": "_to_where",
-    rf"put the {_THING} back(?: where it was)?{_WHEN}": "_back",
-    rf"(?:put|move|set) the {_THING} (?:(?P<cm>\d+) cm )?(?:to the )?(?P<way>left|right) of the {_OTHER}": "_beside",
-    rf"where (?P<tense>is|was) the {_THING}{_WHEN}": "_where",
-    r"how many (?P<thing>[a-z]+?)s? (?:are|stand|lie).*": "_count",
-    rf"(?:bring|get|fetch|give) me the {_THING}": "_bring",
-    rf"(?:find|look for|search for) the {_THING}": "_find",
-    r"take out (?:the )?(?:(?P<number>all|\d+|a|one|two|three|four|five|six) )?(?:of the )?(?:loose )?screws?"
-    r"(?: on the (?P<side>left|right))?(?:,? and (?:tell me|say) which (?:were|are) tight)?": "_screws",
-}
+_DATA = load_data(__package__, "sentences.yaml")
+SENTENCES: dict[str, str] = {pattern.format(**_DATA["parts"]): name for name, pattern in _DATA["sentences"].items()}
 """What is understood, and which script does it."""
 EXAMPLES = "'put the mug where the bowl was yesterday', 'take out the three loose screws on the left'"
 
@@ -79,7 +68,7 @@ class SentencePlanner:
         for pattern, script in SENTENCES.items():
             found = re.fullmatch(pattern, sentence)
             if found is not None:
-                return getattr(self, script)(**{k: v for k, v in found.groupdict().items() if v is not None})
+                return getattr(self, f"_{script}")(**{k: v for k, v in found.groupdict().items() if v is not None})
         raise ConfigError(f"The planner does not know how to '{shorten(words)}'; say it as in {EXAMPLES}.")
 
     def _recall(self, thing: str, tense: str, when: str = "") -> Spot | None:
@@ -175,7 +164,7 @@ def replay(file: Path, use: Use) -> Iterator[tuple[str, bool, bool]]:
     Raises:
         ConfigError: the log cannot be read, or was changed.
     """
-    entries = list(read_audit(file))
+    entries = read_audit(file)
     ends = {(e["session"], e["number"]): e for e in entries if e["event"] in ("answer", "refuse")}
     for entry in entries:
         if entry["event"] == "call" and isinstance(entry["arguments"], dict):

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Collection
+import math
+from collections.abc import Collection, Mapping
 from typing import Annotated, Any, Literal, Optional
 
 import tyro
 
 from golem.errors import ConfigError
 from golem.options import convert
-from golem.skills.spec import Schema, SkillSpec, plain
+from golem.skills.spec import Schema, SkillSpec, plain, read_goal
 
 _SCALARS: dict[str, type[Any]] = {"boolean": bool, "integer": int, "number": float, "string": str}
 HELP = ("-h", "--help")
@@ -37,6 +38,23 @@ def parse_goal(spec: SkillSpec, words: list[str], prog: str, taken: Collection[s
             raise ConfigError(f"The goal's field '{name}' of the skill '{spec.name}' is an option of {prog} itself.")
     kind = _dataclass(spec.name, {**spec.goal, "description": spec.summary})
     return plain(tyro.cli(kind, prog=prog, args=_named(words, properties)))
+
+
+def read_fields(spec: SkillSpec, fields: Mapping[str, object]) -> dict[str, Any]:
+    """Return all fields of a goal of a skill that are said by whomever, with its defaults.
+
+    Raises:
+        ConfigError: one does not exist, is missing, has the wrong type, or is out of its range or far too much.
+    """
+    goal = plain(read_goal(spec.name, _dataclass(spec.name, spec.goal), fields))
+    for name, of in spec.goal["properties"].items():
+        value, shut = goal[name], of.get("exclusiveMinimum")
+        low, high = of.get("minimum", shut), of.get("maximum", math.inf)
+        if low is not None or high < math.inf:
+            low = -math.inf if low is None else low
+            if not low <= value <= high or value == shut:
+                raise ConfigError(f"The {name} of {spec.name} lies between {low:g} and {high:g}; {value:g} does not.")
+    return goal
 
 
 def _named(words: list[str], properties: dict[str, Schema]) -> list[str]:

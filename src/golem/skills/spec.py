@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from golem.errors import ConfigError, GolemError, ModuleFault, shorten, unknown_name
+from golem.errors import ConfigError, GolemError, ModuleFault, shorten
 from golem.options import fill
 
 K = TypeVar("K")
@@ -175,64 +175,6 @@ def read_goal(name: str, kind: type[K], fields: Mapping[str, object]) -> K:
         raise
     except Exception as error:  # a user's class may raise anything
         raise ModuleFault("skill", name, f"its goal raised {type(error).__name__}: {error}") from error
-
-
-def read_fields(spec: SkillSpec, fields: Mapping[str, object]) -> dict[str, Any]:
-    """Return all fields of a goal of a skill that are said by whomever, with its defaults.
-
-    Raises:
-        ConfigError: one does not exist, is missing, has the wrong type, or is out of its range or far too much.
-    """
-    for key, value in fields.items():
-        _check(f"goal field of {spec.name} '{shorten(str(key))}'", value)
-    return _fitted(f"goal of {spec.name}", spec.goal, fields)
-
-
-def _fitted(where: str, of: Schema, value: Any) -> Any:
-    """Return `value` with the defaults of what the schema `of` describes."""
-    if "anyOf" in of:
-        return None if value is None else _fitted(where, of["anyOf"][0], value)
-    if "enum" in of:
-        if not any(value == each and type(value) is type(each) for each in of["enum"]):
-            raise unknown_name(f"value of the {where}", shorten(str(value)), map(str, of["enum"]))
-        return value
-    kinds, wanted = _JSON[of["type"]]
-    if not isinstance(value, kinds) or (isinstance(value, bool) and of["type"] != "boolean"):
-        raise ConfigError(f"The {where} is {wanted}, not {shorten(repr(value))}.")
-    value = cast(Any, value)
-    low, high = of.get("minimum", of.get("exclusiveMinimum")), of.get("maximum", of.get("exclusiveMaximum"))
-    outside = (low is not None and (value < low or value == of.get("exclusiveMinimum"))) or (
-        high is not None and (value > high or value == of.get("exclusiveMaximum"))
-    )
-    if outside:
-        ends = (f"at least {low:g}" if low is not None else "", f"at most {high:g}" if high is not None else "")
-        raise ConfigError(f"The {where} is {' and '.join(filter(None, ends))}, not {value:g}.")
-    if of["type"] == "array":
-        inner = of.get("prefixItems") or [of["items"]] * len(value)
-        if len(inner) != len(value):
-            raise ConfigError(f"The {where} has {len(inner)} values, not {len(value)}.")
-        return [_fitted(where, kind, each) for kind, each in zip(inner, value, strict=True)]
-    if of["type"] != "object":
-        return value
-    properties = of["properties"]
-    for key in value:
-        if key not in properties:
-            raise unknown_name(f"field of the {where}", shorten(str(key)), properties)
-    missing = [key for key in of["required"] if key not in value]
-    if missing:
-        raise ConfigError(f"The {where} needs {', '.join(missing)}.")
-    whole = {key: value.get(key, each.get("default")) for key, each in properties.items()}
-    return {key: _fitted(f"{where}, '{key}'", properties[key], each) for key, each in whole.items()}
-
-
-_JSON: dict[str, tuple[tuple[type, ...], str]] = {
-    "boolean": ((bool,), "true or false"),
-    "integer": ((int,), "an integer"),
-    "number": ((int, float), "a number"),
-    "string": ((str,), "a word"),
-    "array": ((list, tuple), "a list"),
-    "object": ((Mapping,), "an object"),
-}
 
 
 def as_goal(name: str, kind: type[K], goal: object) -> K:
