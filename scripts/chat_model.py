@@ -85,7 +85,7 @@ async def main(config: ChatConfig) -> None:
                 print(f"-> {name} {arguments}", file=sys.stderr)
                 try:
                     answer = await client.call_tool(name, json.loads(arguments))
-                    text = answer.content[0].text
+                    text = json.dumps(answer.structured_content)
                 except ValueError as error:
                     text = f"The arguments are no JSON: {error}"
                 said.append({"role": "tool", "tool_call_id": call["id"], "content": text})

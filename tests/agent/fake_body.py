@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 import numpy as np
 
 from golem.agent.audit import AuditLog, read_audit
-from golem.agent.body import BodyMotion, Picture
+from golem.agent.body import Body, BodyMotion, Picture
 from golem.agent.desk import Desk
 from golem.agent.tool_rules import Rules
 from golem.errors import ConfigError
@@ -100,7 +100,7 @@ class FakeBody:
 
     def moment(self) -> BodyMotion:
         v = 0.5 if self.busy and self._moves else 0.0
-        return BodyMotion(self.x, 0.0, (v, 0.0), np.full((2, 3), self.force))
+        return BodyMotion(self.x, 0.0, np.array((v, 0.0)), np.full((2, 3), self.force))
 
     def in_odom(self, frame: str, x: float, y: float) -> tuple[float, float] | None:
         return (self.x + x, y) if frame == "base_link" else (x, y) if frame == "odom" else None
@@ -137,7 +137,7 @@ class Rig:
         self.body = FakeBody()
         self.file = self.folder / "audit.jsonl"
         self.log = AuditLog(self.file)
-        self.desk = Desk(self.body, self.rules, self.log, clock=lambda: self.now)
+        self.desk = Desk(cast(Body, self.body), self.rules, self.log, clock=lambda: self.now)
 
     def events(self) -> list[str]:
         """Return what the log says happened."""

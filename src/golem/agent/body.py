@@ -107,8 +107,7 @@ class Body(ABC):
             return None
         forces = np.array([self._force.wrench(side, state.q[UPPER], state.tau[UPPER])[:3] for side in SIDES])
         x, y = base.T_odom_base[:2, 3].tolist()
-        vx, vy = base.velocity[:2].tolist()
-        return BodyMotion(x, y, (vx, vy), forces)
+        return BodyMotion(x, y, base.velocity[:2], forces)
 
     def in_odom(self, frame: str, x: float, y: float) -> tuple[float, float] | None:
         """Return a place given in a frame, in odom [m]; None where that is not known."""

@@ -94,7 +94,8 @@ class StackBody(Body):
             return Picture(drawn(self._robot.capture(camera)[0]), ())
         seen = self._bus.latest(topics.detections(camera))
         found = () if seen is None or abs(seen.t - frame.t) > FRESH else seen.objects
-        listed = tuple((o.label, float(o.detection.score), *o.position.tolist()) for o in found)
+        places = [(o, *o.position.tolist()) for o in found]
+        listed = tuple((o.label, float(o.detection.score), x, y, z) for o, x, y, z in places)
         return Picture(drawn(frame.rgb, [(o.label, o.detection.box.tolist()) for o in found]), listed)
 
     def step(self) -> None:

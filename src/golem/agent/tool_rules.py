@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 from golem.errors import ConfigError
 from golem.options import check_values, convert, read_yaml, require
+from golem.types import Array
 
 Run = Literal["free", "ask", "never"]
 """free: at once. ask: the operator says yes or no, each time. never: refused."""
@@ -110,13 +111,13 @@ class Rules:
                 return f"({x:.2f}, {y:.2f}) is outside of the region."
         return ""
 
-    def excess(self, x: float, y: float, velocity: tuple[float, float], force: float) -> str:
+    def excess(self, x: float, y: float, velocity: Array, force: float) -> str:
         """Return why a motion may not go on; empty where it may.
 
         Args:
             x: of base_link in odom [m].
             y: likewise.
-            velocity: of base_link in odom [m/s].
+            velocity: (2,) of base_link in odom [m/s].
             force: the larger one of both hands, beyond what it was at first [N].
         """
         if self.region is not None:

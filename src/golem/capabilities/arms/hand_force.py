@@ -44,7 +44,8 @@ class HandForce:
         """Return the (6, 6) covariance of `wrench`, in its frame, by the two standard deviations above."""
         self._arm.update(q)
         J = self._arm.jacobian(side)[:, ARM_COLUMNS[side]]
-        return np.asarray(TORQUE**2 * np.linalg.inv(J @ J.T + np.diag((TORQUE / WRENCH) ** 2)), np.float64)
+        information = J @ J.T + np.diag((TORQUE / WRENCH) ** 2)
+        return np.asarray(TORQUE**2 * np.linalg.inv(information), dtype=np.float64)
 
     def wrench(self, side: Side, q: Array, tau: Array) -> Array:
         """Return the (6,) force [N] and moment [N m] of a hand on what it touches, in its grasp frame."""
