@@ -27,6 +27,7 @@ probe() {
         gym) echo "import golem.datasets.gym_env" ;;
         policy) echo "from golem.registry import create; create('grasp_method', 'policy', {})" ;;
         graspgen) echo "from golem.registry import create; create('grasp_method', 'graspgen', {})" ;;
+        agent) echo "import zmq; from golem.agent.mcp_server import modules; modules()" ;;
         cluster) echo "from golem.evaluation.harness.trial_executor import DaskExecutor; DaskExecutor('no scheduler')" ;;
         lidar) echo "from golem.registry import create; create('odometry', 'kiss_icp', {}); create('odometry', 'rko_lio', {})" ;;
         view) echo "from golem.dashboard.server import serve; serve('127.0.0.1', 0).stop()" ;;
@@ -66,7 +67,7 @@ trap 'rm -rf "$empty"' EXIT
 python=$(.venv/bin/python -c 'import sys; print(sys._base_executable)')
 environment "$empty/core" core
 failed=0
-for extra in "${@:-pink dds train record foxglove report hardware realsense vision graspgen data gym policy cluster view lidar physx}"; do
+for extra in "${@:-pink dds train record foxglove report hardware realsense vision graspgen agent data gym policy cluster view lidar physx}"; do
     for one in $extra; do
         lock=$one
         [ "$one" = foxglove ] && lock=record

@@ -81,6 +81,19 @@ def test_what_is_remembered_is_shown_with_its_age() -> None:
     assert ages <= {0.5, 2.5} and len(shown.places) >= 1
 
 
+def test_a_day_passes_for_the_memory_alone() -> None:
+    rig = Rig()
+    seen = rig.see(1.0)
+    rig.node.step(1.05)
+    rig.node.sleep(86_400.0, 1.1)
+    assert rig.status.epoch == 86_400.0 and rig.status.looks == 1
+    rig.see(2.0, at=0.5)
+    rig.node.step(2.05)
+    (then,) = rig.memory.query("mug", "at", 10.0)
+    assert then.position == pytest.approx(seen.objects[0].position)
+    assert rig.memory.query("mug")[0].last_seen == 86_402.0
+
+
 def test_what_was_looked_for_and_is_not_there_is_doubted() -> None:
     rig = Rig()
     rig.see(1.0)

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from golem import registry
 from golem.errors import ConfigError, ModuleFault
 from golem.skills.pick import PickGoal
-from golem.skills.spec import MAX_TEXT, plain, read_goal, schema_of, summary
+from golem.skills.spec import MAX_TEXT, plain, read_goal, schema_of, summary, with_ranges
 from golem.skills.walk import WalkGoal
 
 
@@ -148,3 +148,43 @@ class Arrays:
 def test_a_goal_that_cannot_travel_is_named(kind: Any) -> None:
     with pytest.raises(TypeError, match="cannot be written as JSON|is no dataclass"):
         schema_of(kind)
+
+
+@dataclass(frozen=True)
+class Ranged:
+    """Numbers with ends."""
+
+    whole: int
+    share: float = 0.5
+    time: float = 1.0
+    free: float = 0.0
+    words: str = "a"
+
+    def __post_init__(self) -> None:
+        if not 2 <= self.whole <= 9 or not 0.0 <= self.share <= 0.7 or self.time <= 0.0:
+            raise ConfigError("No.")
+
+
+def test_ranges_are_those_that_the_goal_accepts() -> None:
+    schema = with_ranges(Ranged, schema_of(Ranged))["properties"]
+    found = {name: {k: v for k, v in of.items() if "imum" in k} for name, of in schema.items()}
+    # A sample of what has no default has to be accepted for its ends to be found; here 1 is not.
+    assert found["whole"] == {}
+    schema = with_ranges(Shared, schema_of(Shared))["properties"]
+    found = {name: {k: v for k, v in of.items() if "imum" in k} for name, of in schema.items()}
+    assert found == {
+        "whole": {"minimum": 1, "maximum": 9},
+        "share": {"minimum": 0.0, "maximum": 0.7},
+        "time": {"exclusiveMinimum": 0.0},
+        "free": {},
+        "words": {},
+    }
+
+
+@dataclass(frozen=True)
+class Shared(Ranged):
+    """The same, from 1 on."""
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.whole <= 9 or not 0.0 <= self.share <= 0.7 or self.time <= 0.0:
+            raise ConfigError("No.")

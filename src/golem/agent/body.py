@@ -35,13 +35,13 @@ class BodyMotion:
 
     Attributes:
         x, y: of base_link in odom [m].
-        velocity: x, y of base_link in odom [m/s].
+        velocity: (2,) of base_link in odom [m/s].
         forces: (2, 3) of the left and the right hand on the world, in their grasp frames [N].
     """
 
     x: float
     y: float
-    velocity: tuple[float, float]
+    velocity: Array
     forces: Array
 
 
