@@ -50,7 +50,7 @@ BROKEN = {
     "bus": (["drivers", "hands", "--left.port", "/dev/no_bus"], "'/dev/no_bus' cannot be opened"),
     "lidar": (["drivers", "lidar", "192.0.2.1"], "Nobody can listen to the LiDAR at 192.0.2.1"),
     "board's port": (["safety", "--estop.use", "serial"], "estop: {use: serial, port: /dev/ttyACM0}"),
-    "train": (["train", "arms"], "valid: detector, grasps, legs"),
+    "train": (["train", "arms"], "valid: act, detector, grasps, legs"),
 }
 
 

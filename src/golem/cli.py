@@ -163,7 +163,7 @@ TRAINERS = {
 def _record(words: list[str]) -> int:
     """Record a domain into a bag that ROS 2 tools and Foxglove read; --lerobot DATASET: into a data set."""
     if words[:1] == ["--lerobot"]:
-        return _one_of(["--lerobot", *words[1:]], "record", "way to record", {"--lerobot": DATASETS["live"]})
+        return _dataset(["live", *words[1:]])
     from golem.runtime.live.record_commands import RecordConfig, run_record
 
     return _exit_code(run_record(_parse(RecordConfig, "record", words)))
@@ -172,14 +172,10 @@ def _record(words: list[str]) -> int:
 def _dataset(words: list[str]) -> int:
     """Data sets in LeRobot's format: `dataset record`, live, export, import, check, delete, split, merge."""
     _prepare_graphics()
-    return _one_of(words, "dataset", "thing to do with a data set", DATASETS)
+    from golem.datasets import commands
 
-
-DATASETS = {
-    name: ("golem.datasets.commands", f"{name.title()}DatasetConfig", f"run_{name}")
-    for name in ("record", "live", "export", "import", "check", "delete", "split", "merge")
-}
-"""What is done with a data set."""
+    name = _named(words, "dataset", "thing to do with a data set", commands.COMMANDS)
+    return 0 if name is None else _exit_code(commands.run(name, words[1:]))
 
 
 def _safety(words: list[str]) -> int:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +13,8 @@ pytest.importorskip("av")
 
 from golem.datasets.episode_writer import DatasetWriter  # noqa: E402
 from golem.datasets.schema import Recipe  # noqa: E402
-from golem.robots.sensors.cameras import CAMERAS  # noqa: E402
 
-SMALL = Recipe(15, {"right_hand": replace(CAMERAS["right_hand"], width=64, height=48)}, depth=True, masks=("screw",))
+SMALL = Recipe(15, {"right_hand": (64, 48)}, depth=True, masks=("screw",))
 PLAIN = Recipe(15)
 
 
@@ -31,7 +29,7 @@ def frames(count: int, seed: int = 0, recipe: Recipe = SMALL) -> list[dict[str, 
             if len(feature.shape) == 1
         }
         for name in recipe.cameras:
-            size = recipe.cameras[name].height, recipe.cameras[name].width
+            size = recipe.cameras[name][::-1]
             frame[f"observation.images.{name}"] = np.full((*size, 3), 40 + 3 * k, np.uint8)
             frame[f"observation.depth.{name}"] = rng.integers(0, 500, size).astype(np.uint16)
             frame[f"observation.masks.{name}"] = rng.integers(0, 2, size).astype(np.uint8)

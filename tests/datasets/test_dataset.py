@@ -11,20 +11,10 @@ import pytest
 from tests.datasets.conftest import PLAIN, SMALL, frames, write
 
 from golem.capabilities.policies.vectors import STATE
+from golem.datasets import commands, swap
 from golem.datasets import episode_writer as writing
-from golem.datasets import swap
-from golem.datasets.commands import (
-    CheckDatasetConfig,
-    DeleteDatasetConfig,
-    MergeDatasetConfig,
-    SplitDatasetConfig,
-    run_check,
-    run_delete,
-    run_merge,
-    run_split,
-)
 from golem.datasets.episode_writer import DatasetWriter
-from golem.datasets.findings import check
+from golem.datasets.findings import findings as check
 from golem.datasets.schema import DatasetError, Recipe
 from golem.datasets.store import DatasetFolder
 from golem.errors import GolemError, OutputError
@@ -33,7 +23,7 @@ pq = pytest.importorskip("pyarrow.parquet")
 
 
 def told(root: Path) -> list[str]:
-    return [str(finding) for finding in check(DatasetFolder(root))]
+    return [*check(DatasetFolder(root))]
 
 
 def same_actions(data: DatasetFolder, index: int, seed: int, recipe: Recipe = SMALL) -> bool:
@@ -67,7 +57,7 @@ def test_statistics_are_those_of_all_frames(dataset: Path) -> None:
 
 
 def test_a_sound_data_set_has_no_findings(dataset: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run_check(CheckDatasetConfig(dataset))
+    assert commands.check(dataset)
     assert "3 episodes, 95 frames at 15 fps: no findings." in capsys.readouterr().out
 
 
@@ -123,29 +113,29 @@ def test_a_frame_without_sense_is_refused(tmp_path: Path, wrong: str) -> None:
 
 
 def test_delete(dataset: Path) -> None:
-    run_delete(DeleteDatasetConfig(dataset, (1,)))
+    commands.delete(dataset, (1,))
     data = DatasetFolder(dataset)
     assert [e.length for e in data.episodes] == [20, 5] and same_actions(data, 1, 2)
     assert told(dataset) == []
     with pytest.raises(DatasetError, match="episodes 0 to 1, no 7"):
-        run_delete(DeleteDatasetConfig(dataset, (7,)))
+        commands.delete(dataset, (7,))
     with pytest.raises(DatasetError, match="without episodes"):
-        run_delete(DeleteDatasetConfig(dataset, (0, 1)))
+        commands.delete(dataset, (0, 1))
     assert told(dataset) == []
 
 
 def test_split_and_merge(dataset: Path, tmp_path: Path) -> None:
-    run_split(SplitDatasetConfig(dataset, tmp_path / "a", tmp_path / "b", share=0.67))
+    commands.split(dataset, tmp_path / "a", tmp_path / "b", share=0.67)
     assert [len(DatasetFolder(tmp_path / name).episodes) for name in "ab"] == [2, 1]
     other = write(tmp_path / "other", (4,), task="Drop it.")
-    run_merge(MergeDatasetConfig(tmp_path / "all", (tmp_path / "a", other, tmp_path / "b")))
+    commands.merge(tmp_path / "all", (tmp_path / "a", other, tmp_path / "b"))
     data = DatasetFolder(tmp_path / "all")
     assert sum(e.length for e in data.episodes) == 99 and data.tasks == ["Take a screw.", "Drop it."]
     assert told(tmp_path / "all") == told(tmp_path / "a") == []
     with pytest.raises(GolemError, match="other features"):
-        run_merge(MergeDatasetConfig(tmp_path / "x", (dataset, write(tmp_path / "plain", (3,), PLAIN))))
+        commands.merge(tmp_path / "x", (dataset, write(tmp_path / "plain", (3,), PLAIN)))
     with pytest.raises(OutputError, match="exists already"):
-        run_merge(MergeDatasetConfig(tmp_path / "all", (dataset,)))
+        commands.merge(tmp_path / "all", (dataset,))
 
 
 def full(*_: Any, **__: Any) -> None:
@@ -228,7 +218,7 @@ def test_missing_and_short_videos_are_found(dataset: Path) -> None:
     found = told(dataset)
     assert len(found) == 2 and "cannot be read" in found[0] and "ends after 5 of the 70" in found[1]
     with pytest.raises(DatasetError, match="missing"):
-        run_delete(DeleteDatasetConfig(dataset, (2,)))
+        commands.delete(dataset, (2,))
 
 
 def plant(dataset: Path, fault: str) -> None:

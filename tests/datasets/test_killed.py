@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from golem.datasets.findings import check
+from golem.datasets.findings import findings as check
 from golem.datasets.store import DatasetFolder
 
 KILLS = int(os.environ.get("GOLEM_DATASET_KILLS", "6"))
@@ -41,6 +41,6 @@ def test_no_finished_episode_is_lost_and_none_is_there_by_half(tmp_path: Path, k
         data = DatasetFolder(root)
         # One more may be whole whose writer did not come to say so.
         assert finished <= len(data.episodes) <= finished + 1
-        assert [str(finding) for finding in check(data)] == []
+        assert [*check(data)] == []
         finished = len(data.episodes)
     assert finished > 0

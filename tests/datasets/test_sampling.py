@@ -14,9 +14,10 @@ pytest.importorskip("av")
 pytest.importorskip("mcap")
 from tests.dashboard.conftest import BLIND
 
-from golem.datasets.commands import ExportDatasetConfig, ImportDatasetConfig, PictureOptions, run_export, run_import
+from golem.datasets import commands
+from golem.datasets.commands import PictureOptions
 from golem.datasets.episode_writer import DatasetWriter
-from golem.datasets.findings import check
+from golem.datasets.findings import findings as check
 from golem.datasets.sampling import StackRecorder, recipe
 from golem.datasets.schema import DatasetError
 from golem.datasets.store import DatasetFolder
@@ -55,9 +56,9 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.slow
 def test_a_bag_exports_to_what_was_recorded_at_once(recorded: Path) -> None:
-    assert run_export(ExportDatasetConfig(recorded / "bag", recorded / "exported", pictures=PICTURES)) == 1
+    assert commands.export(recorded / "bag", recorded / "exported", pictures=PICTURES) == 1
     direct, exported = DatasetFolder(recorded / "direct"), DatasetFolder(recorded / "exported")
-    assert [str(f) for f in check(direct)] == [str(f) for f in check(exported)] == []
+    assert [*check(direct)] == [*check(exported)] == []
     a, b = direct.episodes[0], exported.episodes[0]
     # The bag says when a thing was published, so its frames may lie a tick beside; those of one state are the same.
     x, y = direct.values(a, "observation.state"), exported.values(b, "observation.state")
@@ -71,7 +72,7 @@ def test_a_bag_exports_to_what_was_recorded_at_once(recorded: Path) -> None:
 def test_an_episode_becomes_a_bag_that_stands_in_for_the_robot(recorded: Path) -> None:
     from golem.robots.replay.robot import ReplayRobot, ReplayRobotConfig
 
-    assert run_import(ImportDatasetConfig(recorded / "direct", recorded / "again")) > 100
+    assert commands.to_bag(recorded / "direct", recorded / "again") > 100
     assert "/realsense/right_hand/color/image_raw" in Bag(recorded / "again").topics
     robot = ReplayRobot(ReplayRobotConfig(recorded / "again"))
     data = DatasetFolder(recorded / "direct")
@@ -79,7 +80,7 @@ def test_an_episode_becomes_a_bag_that_stands_in_for_the_robot(recorded: Path) -
     np.testing.assert_allclose(robot.joints()[0], state[0, :27], atol=1e-6)
     assert robot.capture("right_hand")[0].shape == (270, 480, 3)
     with pytest.raises(DatasetError, match="no 7"):
-        run_import(ImportDatasetConfig(recorded / "direct", recorded / "other", episode=7))
+        commands.to_bag(recorded / "direct", recorded / "other", episode=7)
 
 
 def test_cameras_and_sizes_are_checked() -> None:

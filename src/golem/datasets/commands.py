@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-import json
 import math
+from collections.abc import Callable, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import numpy as np
+import tyro
 from tyro.conf import OmitArgPrefixes, Positional, arg
 
+from golem.datasets.episode_writer import DatasetWriter, drafts, rewritten
 from golem.datasets.sampling import MessageRecorder, StackRecorder, recipe, write_bag
-from golem.datasets.schema import Recipe
+from golem.datasets.schema import VECTORS, Recipe
+from golem.datasets.store import DatasetFolder
 from golem.errors import ConfigError, OutputError
 from golem.middleware.dds.domain import DdsConfig
 
-if TYPE_CHECKING:
-    from golem.evaluation.base import TrialSpec
+TASK = "Take a loose screw and drop it in the tray."
 
 
 @dataclass(frozen=True)
@@ -41,140 +43,46 @@ class PictureOptions:
         return recipe(self.fps, self.cameras, self.width, self.depth, self.masks)
 
 
-@dataclass(frozen=True)
-class RecordDatasetConfig:
-    """Record trials of a rung as demonstrations: an episode per success. A data set that is there goes on."""
-
-    dataset: Positional[Path]
-    """Folder of the data set."""
-    rung: str = "tether"
-    """Rung of the ladder."""
-    method: str = "visual_servo"
-    """Who demonstrates."""
-    n: Annotated[int, arg(aliases=("-n",))] = 10
-    """Trials."""
-    seed: int = 1000
-    """Seed; a comparison on the ladder must have another, by default it has 0."""
-    profile: str = "field"
-    """Realism of sensors and world: ideal, bench or field."""
-    use: tuple[str, ...] = ()
-    """Replace other modules of the stack, as in golem ladder."""
-    stages: tuple[str, ...] = ()
-    """Record these stages of the skill alone, e.g. servo grasp."""
-    failures: bool = False
-    """Keep lost trials, too."""
-    task: str = "Take a loose screw and drop it in the tray."
-    """What is done, as a sentence."""
-    pictures: OmitArgPrefixes[PictureOptions] = field(default_factory=PictureOptions)
+Pictures = OmitArgPrefixes[PictureOptions]
+_PLAIN = PictureOptions()
 
 
-@dataclass(frozen=True)
-class ExportDatasetConfig:
-    """Export a bag, or the trials of a run folder, which are run again, as episodes of a data set."""
+def record(
+    dataset: Positional[Path],
+    rung: str = "tether",
+    method: str = "visual_servo",
+    n: Annotated[int, arg(aliases=("-n",))] = 10,
+    seed: int = 1000,
+    profile: str = "field",
+    use: tuple[str, ...] = (),
+    stages: tuple[str, ...] = (),
+    failures: bool = False,
+    task: str = TASK,
+    pictures: Pictures = _PLAIN,
+) -> int:
+    """Record trials of a rung as demonstrations: an episode per success. A data set that is there goes on.
 
-    source: Positional[Path]
-    """Folder of a bag, an MCAP file, or a run folder of golem ladder."""
-    dataset: Positional[Path]
-    """Folder of the data set; one that is there goes on."""
-    trials: tuple[str, ...] = ()
-    """Of a run folder: METHOD:INDEX; default: all that succeeded."""
-    task: str = "Take a loose screw and drop it in the tray."
-    """What is done, as a sentence."""
-    pictures: OmitArgPrefixes[PictureOptions] = field(default_factory=PictureOptions)
-
-
-@dataclass(frozen=True)
-class LiveDatasetConfig:
-    """Record a domain as one episode of a data set, until Ctrl-C; what is not finished is not in it."""
-
-    dataset: Positional[Path]
-    """Folder of the data set; one that is there goes on."""
-    seconds: float = math.inf
-    """Time to record."""
-    task: str = "Take a loose screw and drop it in the tray."
-    """What is done, as a sentence."""
-    pictures: OmitArgPrefixes[PictureOptions] = field(default_factory=PictureOptions)
-    dds: OmitArgPrefixes[DdsConfig] = field(default_factory=DdsConfig)
-
-
-@dataclass(frozen=True)
-class ImportDatasetConfig:
-    """Write an episode of a data set of this robot as a bag, which `robot: {use: replay}` and ROS 2 tools read."""
-
-    dataset: Positional[Path]
-    """Folder of the data set."""
-    bag: Positional[Path]
-    """Folder to create."""
-    episode: int = 0
-    """Which one."""
-
-
-@dataclass(frozen=True)
-class CheckDatasetConfig:
-    """Check a data set: frame times, gaps, ranges, stuck sensors, and its videos against its table."""
-
-    dataset: Positional[Path]
-    """Folder of the data set."""
-
-
-@dataclass(frozen=True)
-class DeleteDatasetConfig:
-    """Delete episodes; those that stay are numbered anew."""
-
-    dataset: Positional[Path]
-    """Folder of the data set."""
-    episodes: Positional[tuple[int, ...]]
-    """Their numbers."""
-
-
-@dataclass(frozen=True)
-class SplitDatasetConfig:
-    """Split a data set in two: the first takes a share of the episodes, drawn by a seed."""
-
-    dataset: Positional[Path]
-    """Folder of the data set; it stays."""
-    first: Positional[Path]
-    """Folder to create."""
-    second: Positional[Path]
-    """Folder to create."""
-    share: float = 0.8
-    """Share of the episodes that the first one gets."""
-    seed: int = 0
-    """Of the draw."""
-
-
-@dataclass(frozen=True)
-class MergeDatasetConfig:
-    """Merge data sets of the same features into a new one."""
-
-    dataset: Positional[Path]
-    """Folder to create."""
-    sources: Positional[tuple[Path, ...]]
-    """Folders of the data sets."""
-
-
-def run_record(config: RecordDatasetConfig) -> int:
-    """Record; return how many episodes were added.
-
-    Raises:
-        ConfigError: an option is wrong.
-        DatasetError, OutputError, MissingExtra: see `DatasetWriter`.
+    Args:
+        dataset: folder of the data set.
+        rung: of the ladder.
+        method: who demonstrates.
+        n: trials.
+        seed: a comparison on the ladder must have another, by default it has 0.
+        profile: ideal, bench or field.
+        use: replace other modules of the stack, as in golem ladder.
+        stages: record these stages of the skill alone, e.g. servo grasp.
+        failures: keep lost trials, too.
+        task: what is done, as a sentence.
+        pictures: see there.
     """
     from golem.evaluation.harness.ladder import LadderConfig, prepare
 
-    if config.n < 1:
-        raise ConfigError(f"-n is {config.n}; it must be 1 or more.")
-    asked = LadderConfig(config.rung, (config.method,), config.n, config.profile, config.seed, use=config.use).whole()
-    request, _ = prepare(asked)
-    specs = request.wanted({})
-    return _trials(config.dataset, specs, config.pictures.recipe(), config.task, config.stages, config.failures)
+    request, _ = prepare(LadderConfig(rung, (method,), n, profile, seed, use=use).whole())
+    return _trials(dataset, request.wanted({}), pictures.recipe(), task, stages, failures)
 
 
-def _trials(
-    root: Path, specs: Any, what: Recipe, task: str, stages: tuple[str, ...] = (), failures: bool = False
-) -> int:
+def _trials(root: Path, specs: Any, what: Recipe, task: str, stages: tuple[str, ...], failures: bool) -> int:
     """Run trials, and add those that succeed to the data set in `root`; returns how many."""
-    from golem.datasets.episode_writer import DatasetWriter
     from golem.evaluation.base import RUNGS, make_rung
     from golem.evaluation.harness.trials import run_trial
 
@@ -189,169 +97,168 @@ def _trials(
 
             rung.onlooker = look
             outcome = run_trial(rung, spec)
-            if (outcome.success or failures) and recorders and recorders[-1].frames:
-                number = writer.finish()
-                print(f"Trial {spec.method}:{spec.index} is episode {number}.", flush=True)
+            if (outcome.success or failures) and recorders and recorders[-1].begun:
+                print(f"Trial {spec.method}:{spec.index} is episode {writer.finish()}.", flush=True)
                 added += 1
             else:
                 writer.discard()
-                lost = outcome.detail if not outcome.success else "Nothing of it was to be recorded."
-                print(f"Trial {spec.method}:{spec.index} is left out: {lost}", flush=True)
+                print(f"Trial {spec.method}:{spec.index} is left out: {outcome.detail}", flush=True)
         print(f"{writer.episodes} episodes in {root}.", flush=True)
     return added
 
 
-def run_export(config: ExportDatasetConfig) -> int:
-    """Export; return how many episodes were added.
+def export(
+    source: Positional[Path],
+    dataset: Positional[Path],
+    trials: tuple[str, ...] = (),
+    task: str = TASK,
+    pictures: Pictures = _PLAIN,
+) -> int:
+    """Export a bag, or the trials of a run folder, which are run again, as episodes of a data set.
 
-    Raises:
-        BagError, ConfigError, DatasetError, OutputError, MissingExtra: as the parts say.
+    Args:
+        source: folder of a bag, an MCAP file, or a run folder of golem ladder.
+        dataset: folder of the data set; one that is there goes on.
+        trials: of a run folder: METHOD:INDEX; default: all that succeeded.
+        task: what is done, as a sentence.
+        pictures: see there.
     """
-    from golem.datasets.episode_writer import DatasetWriter
+    what = pictures.recipe()
+    if (source / "trials.jsonl").exists():
+        from golem.evaluation.harness.records import read_records
 
-    what = config.pictures.recipe()
-    if (config.source / "trials.jsonl").exists():
-        return _trials(config.dataset, _specs(config), what, config.task)
+        records = {f"{r.method}:{r.index}": r for r in read_records(source / "trials.jsonl")}
+        unknown = next((name for name in trials if name not in records), None)
+        if unknown is not None:
+            raise ConfigError(f"{source} has no trial {unknown}; it has {', '.join(list(records)[:5])}, ...")
+        specs = [r.spec for name, r in records.items() if (name in trials if trials else r.success)]
+        return _trials(dataset, specs, what, task, (), False)
     from golem.middleware.bags.reader import Bag
 
-    bag = Bag(config.source)
-    with closing(DatasetWriter(config.dataset, what, f"bag {config.source.name}")) as writer:
-        sink = MessageRecorder(writer, what, config.task)
+    bag = Bag(source)
+    with closing(DatasetWriter(dataset, what, f"bag {source.name}")) as writer:
+        sink = MessageRecorder(writer, what, task)
         for message in bag.messages(sink.topics):
             sink.write(message)
-        number = writer.finish()
-    print(f"{config.source} is episode {number} of {config.dataset}.")
+        print(f"{source} is episode {writer.finish()} of {dataset}.")
     return 1
 
 
-def _specs(config: ExportDatasetConfig) -> list[TrialSpec]:
-    from golem.evaluation.harness.records import read_records
+def live(
+    dataset: Positional[Path],
+    seconds: float = math.inf,
+    task: str = TASK,
+    pictures: Pictures = _PLAIN,
+    dds: OmitArgPrefixes[DdsConfig] = DdsConfig(),  # noqa: B008 - frozen
+) -> int:
+    """Record a domain as one episode of a data set, until Ctrl-C; what is not finished is not in it.
 
-    records = {f"{r.method}:{r.index}": r for r in read_records(config.source / "trials.jsonl")}
-    unknown = next((name for name in config.trials if name not in records), None)
-    if unknown is not None:
-        raise ConfigError(f"{config.source} has no trial {unknown}; it has {', '.join(list(records)[:5])}, ...")
-    return [r.spec for k, r in records.items() if (k in config.trials if config.trials else r.success)]
-
-
-def run_live(config: LiveDatasetConfig) -> int:
-    """Record; return the frames of the episode.
-
-    Raises:
-        DatasetError, OutputError, MissingExtra: see `DatasetWriter`; also if nothing was on the domain.
-        DdsError: the domain cannot be joined.
+    Args:
+        dataset: folder of the data set; one that is there goes on.
+        seconds: time to record.
+        task: what is done, as a sentence.
+        pictures: see there.
+        dds: the domain.
     """
-    from golem.datasets.episode_writer import DatasetWriter
     from golem.interfaces.recorded import public_topics
     from golem.middleware.bags.recorder import Recorder
     from golem.middleware.dds.connect import connect
     from golem.middleware.interrupt import interrupted
     from golem.runtime.live.exclusive_writers import identity
 
-    what = config.pictures.recipe()
+    what = pictures.recipe()
     with (
-        closing(connect(config.dds, identity("record"))) as participant,
+        closing(connect(dds, identity("record"))) as participant,
         interrupted() as stop,
-        closing(DatasetWriter(config.dataset, what, f"domain {config.dds}")) as writer,
+        closing(DatasetWriter(dataset, what, f"domain {dds}")) as writer,
     ):
-        sink = MessageRecorder(writer, what, config.task)
+        sink = MessageRecorder(writer, what, task)
         with closing(Recorder(participant, sink)) as recorder:
             recorder.add(public_topics(sink.topics))
-            print(f"Recording {config.dds} to {config.dataset}. Ctrl-C ends it.", flush=True)
-            recorder.run(stop, lambda: None, config.seconds)
+            print(f"Recording {dds} to {dataset}. Ctrl-C ends it.", flush=True)
+            recorder.run(stop, lambda: None, seconds)
         frames = writer.length
-        print(f"{frames} frames are episode {writer.finish()} of {config.dataset}.", flush=True)
+        print(f"{frames} frames are episode {writer.finish()} of {dataset}.", flush=True)
     for name in sorted(recorder.overruns):
         print(f"{name}: more than could be kept; some were lost.")
     return frames
 
 
-def run_import(config: ImportDatasetConfig) -> int:
-    """Write the bag; return its messages.
-
-    Raises:
-        DatasetError: the data set is of another robot, or damaged.
-        OutputError: the bag cannot be written.
-    """
-    from golem.capabilities.policies.vectors import EFFORT, STATE
-    from golem.datasets.store import DatasetFolder
-
-    data = DatasetFolder(config.dataset)
-    data.require("observation.state", "observation.effort", like={"observation.state": [*STATE]})
-    data.require("observation.effort", like={"observation.effort": [*EFFORT]})
-    episode = data.episode(config.episode)
-    frames = {name: data.values(episode, name) for name in ("observation.state", "observation.effort")}
+def to_bag(dataset: Positional[Path], bag: Positional[Path], episode: int = 0) -> int:
+    """Write an episode of a data set of this robot as a bag, which `robot: {use: replay}` and ROS 2 tools read."""
+    data, names = DatasetFolder(dataset), ("observation.state", "observation.effort")
+    data.require(*names, like={name: [*VECTORS[name]] for name in names})
+    chosen = data.episode(episode)
+    frames = {name: data.values(chosen, name) for name in names}
     for name in data.videos:
         depth = name.replace(".images.", ".depth.")
         if depth in data.features:
-            frames |= {name: np.array(list(data.pictures(episode, name))), depth: data.values(episode, depth)}
-    written = write_bag(frames, data.fps, config.bag)
-    print(f"{written} messages in {config.bag}.")
+            frames |= {name: np.array(list(data.pictures(chosen, name))), depth: data.values(chosen, depth)}
+    written = write_bag(frames, data.fps, bag)
+    print(f"{written} messages in {bag}.")
     return written
 
 
-def run_check(config: CheckDatasetConfig) -> bool:
-    """Print what is wrong; return whether nothing is.
+def check(dataset: Positional[Path]) -> bool:
+    """Check a data set: frame times, gaps, ranges, stuck sensors, and its videos against its table."""
+    from golem.datasets.findings import findings
 
-    Raises:
-        DatasetError: it cannot be read at all.
-    """
-    from golem.datasets.findings import check
-    from golem.datasets.store import DatasetFolder
-
-    data = DatasetFolder(config.dataset)
-    found = list(check(data))
-    for finding in found:
-        print(finding)
+    data = DatasetFolder(dataset)
+    found = list(findings(data))
     frames = sum(episode.length for episode in data.episodes)
-    print(f"{len(data.episodes)} episodes, {frames} frames at {data.fps} fps: {len(found) or 'no'} findings.")
+    told = f"{len(data.episodes)} episodes, {frames} frames at {data.fps} fps: {len(found) or 'no'} findings."
+    print(*found, told, sep="\n")
     return not found
 
 
-def run_delete(config: DeleteDatasetConfig) -> None:
-    """Delete; errors as for `rewritten`."""
-    from golem.datasets.episode_writer import drafts, rewritten
-    from golem.datasets.store import DatasetFolder
-
-    data = DatasetFolder(config.dataset)
-    gone = {data.episode(k).index for k in config.episodes}
-    rewritten(data, config.dataset, drafts(data, [e.index for e in data.episodes if e.index not in gone]))
+def delete(dataset: Positional[Path], episodes: Positional[tuple[int, ...]]) -> None:
+    """Delete episodes; those that stay are numbered anew."""
+    data = DatasetFolder(dataset)
+    gone = {data.episode(k).index for k in episodes}
+    rewritten(data, dataset, drafts(data, [e.index for e in data.episodes if e.index not in gone]))
     print(f"{len(data.episodes) - len(gone)} episodes are left.")
 
 
-def run_split(config: SplitDatasetConfig) -> None:
-    """Split; errors as for `rewritten`."""
-    from golem.datasets.episode_writer import drafts, rewritten
-    from golem.datasets.store import DatasetFolder
-
-    data = DatasetFolder(config.dataset)
-    n, order = len(data.episodes), np.random.default_rng(config.seed).permutation(len(data.episodes))
-    count = round(config.share * n)
+def split(
+    dataset: Positional[Path], first: Positional[Path], second: Positional[Path], share: float = 0.8, seed: int = 0
+) -> None:
+    """Split a data set in two new ones: the first takes a share of the episodes, drawn by a seed."""
+    data = DatasetFolder(dataset)
+    n = len(data.episodes)
+    order, count = np.random.default_rng(seed).permutation(n), round(share * n)
     if not 0 < count < n:
-        raise ConfigError(f"A share of {config.share:g} of {n} episodes leaves one part empty.")
-    for root, chosen in ((config.first, order[:count]), (config.second, order[count:])):
+        raise ConfigError(f"A share of {share:g} of {n} episodes leaves one part empty.")
+    for root, chosen in ((first, order[:count]), (second, order[count:])):
         _refuse(root)
         rewritten(data, root, drafts(data, sorted(int(k) for k in chosen)))
         print(f"{len(chosen)} episodes in {root}.")
 
 
-def run_merge(config: MergeDatasetConfig) -> None:
-    """Merge; errors as for `rewritten`."""
-    from golem.datasets.episode_writer import drafts, rewritten
-    from golem.datasets.store import DatasetFolder
-
-    _refuse(config.dataset)
-    if not config.sources:
+def merge(dataset: Positional[Path], sources: Positional[tuple[Path, ...]]) -> None:
+    """Merge data sets of the same features into a new one."""
+    _refuse(dataset)
+    if not sources:
         raise ConfigError("Say which data sets to merge.")
-    data = [DatasetFolder(root) for root in config.sources]
+    data = [DatasetFolder(root) for root in sources]
     for other in data[1:]:
-        if (other.fps, json.dumps(other.info["features"])) != (data[0].fps, json.dumps(data[0].info["features"])):
+        if (other.fps, other.info["features"]) != (data[0].fps, data[0].info["features"]):
             raise ConfigError(f"{other.root} has other features or another rate than {data[0].root}.")
     episodes = [draft for each in data for draft in drafts(each)]
-    rewritten(data[0], config.dataset, episodes)
-    print(f"{len(episodes)} episodes in {config.dataset}.")
+    rewritten(data[0], dataset, episodes)
+    print(f"{len(episodes)} episodes in {dataset}.")
 
 
 def _refuse(root: Path) -> None:
     if root.exists():
         raise OutputError(f"{root} exists already; give another name.")
+
+
+COMMANDS: dict[str, Callable[..., object]] = {
+    **{each.__name__: each for each in (record, live, export, check, delete, split, merge)},
+    "import": to_bag,
+}
+
+
+def run(name: str, words: Sequence[str]) -> object:
+    """Run `golem dataset NAME` with the `words` that follow it."""
+    return tyro.cli(COMMANDS[name], prog=f"golem dataset {name}", args=list(words))

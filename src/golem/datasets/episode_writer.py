@@ -5,43 +5,24 @@ from __future__ import annotations
 import json
 import os
 import shutil
-from collections.abc import Mapping, Sequence
-from contextlib import ExitStack, suppress
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from golem.datasets.schema import (
-    ABOUT,
-    CHUNK,
-    CODEC,
-    CRF,
-    DATA,
-    EPISODES,
-    GOP,
-    INFO,
-    ROBOT,
-    STATS,
-    TASKS,
-    VERSION,
-    VIDEO,
-    DatasetError,
-    Feature,
-    Recipe,
-    described,
-    extra,
-    picture_statistics,
-    pooled,
-    read_features,
-    statistics,
-    tasks_table,
-)
+from golem.datasets import schema
+from golem.datasets.schema import DatasetError, Feature, Recipe, extra
 from golem.datasets.store import DatasetFolder
 from golem.datasets.swap import beside, held, link, replaced
 from golem.errors import OutputError
 
+CODEC, GOP, CRF = "libsvtav1", 10, 30
+"""Encoder (BSD, as LeRobot's own), distance of key frames, quality [own: 11 ms of CPU a VGA frame; LeRobot's
+distance of 2 takes 60]."""
 BATCH = 64
 """Frames whose depth and masks are held in memory [own: 40 MB of VGA depth]."""
 LOOK = 8
@@ -50,14 +31,12 @@ LOOK = 8
 
 @dataclass
 class Draft:
-    """An episode in the making or one that is whole, before it has its number.
+    """An episode that is whole, before it has its number.
 
     Attributes:
-        tasks: what is done in it.
-        length: frames.
+        tasks, length, stats: as in meta/episodes.
         data: its file of data.
         videos: its files by feature; its pictures begin at `starts` in them [s].
-        stats: by feature.
     """
 
     tasks: list[str]
@@ -74,26 +53,21 @@ class Video:
     def __init__(self, path: Path, feature: Feature, fps: int) -> None:
         """Create it."""
         os.environ.setdefault("SVT_LOG", "1")  # else the encoder writes a page to the terminal
-        av = extra("av")
-        self._av, self._path, self._shape, self._n = av, path, feature.shape, 0
-        self._out = av.open(str(path), "w")
-        options = {"crf": str(CRF), "g": str(GOP), "preset": "11"}
-        self._stream = self._out.add_stream(CODEC, rate=fps, options=options)
+        self._av, self.counts = extra("av"), np.zeros((3, 256))
+        self._out = self._av.open(str(path), "w")
+        self._stream = self._out.add_stream(CODEC, rate=fps, options={"crf": f"{CRF}", "g": f"{GOP}", "preset": "11"})
         self._stream.height, self._stream.width = feature.shape[:2]
         self._stream.pix_fmt = "yuv420p"
-        self.counts = np.zeros((3, 256))
 
-    def add(self, picture: np.ndarray[Any, Any]) -> None:
+    def add(self, picture: NDArray[Any]) -> None:
         """Append one picture (height, width, 3)."""
-        for packet in self._stream.encode(self._av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), "rgb24")):
-            self._out.mux(packet)
+        self._out.mux(self._stream.encode(self._av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), "rgb24")))
         for channel in range(3):
             self.counts[channel] += np.bincount(picture[::LOOK, ::LOOK, channel].ravel(), minlength=256)
 
     def finish(self) -> None:
         """Complete the file."""
-        for packet in self._stream.encode():
-            self._out.mux(packet)
+        self._out.mux(self._stream.encode())
         self._out.close()
 
     def drop(self) -> None:
@@ -108,6 +82,7 @@ class DatasetWriter:
     Attributes:
         root: folder of the data set.
         episodes: how many are in it.
+        length: frames of the episode in the making.
     """
 
     def __init__(self, root: Path, recipe: Recipe, origin: str = "") -> None:
@@ -119,51 +94,41 @@ class DatasetWriter:
             MissingExtra: the extra `data` is not installed.
         """
         extra("pyarrow.parquet"), extra("av")
-        self.root, self._features, self._fps = root, recipe.features(), recipe.fps
-        self._exit = ExitStack()
-        self._exit.enter_context(held(root))
-        try:
-            self._about = {
-                "origin": origin,
-                "units": {k: f.units for k, f in self._features.items() if f.units} | {"observation.depth": "mm"},
-                "frames": "palms, velocities and `up` in base_link: x forward, z up; palms: z approach, y closing",
-                "masks": list(recipe.masks),
-            }
-            self.episodes = 0
+        self.root, self._features, self._fps, self.episodes, self.length = root, recipe.features(), recipe.fps, 0, 0
+        self._about = {
+            "origin": origin,
+            "units": {k: list(v.values()) for k, v in schema.VECTORS.items()} | {"observation.depth": "mm"},
+            "frames": "palms, velocities and `up` in base_link: x forward, z up; palms: z approach, y closing",
+            "masks": list(recipe.masks),
+        }
+        self._rows: dict[str, list[Any]] = {}
+        self._videos: dict[str, Video] = {}
+        self._table: Any = None
+        self._folder = beside(root, "episode")
+        with ExitStack() as held_:
+            held_.enter_context(held(root))
             if root.exists() and any(root.iterdir()):
-                there = DatasetFolder(root)
-                here = described(self._features, self._fps)
+                there, here = DatasetFolder(root), schema.described(self._features, self._fps)
                 # By way of JSON, where a tuple is a list.
-                if there.fps != self._fps or there.info["features"] != json.loads(json.dumps(here)):
+                if there.info["features"] != json.loads(json.dumps(here)) or there.fps != self._fps:
                     raise DatasetError(
                         f"The data set {root} was recorded otherwise ({there.fps} fps; {', '.join(there.features)}), "
                         "and an episode like this does not fit; give another folder."
                     )
                 self.episodes = len(there.episodes)
-        except BaseException:
-            self._exit.close()
-            raise
-        self._rows: dict[str, list[Any]] = {}
-        self._videos: dict[str, Video] = {}
-        self._table: Any = None
-        self._task = ""
+            self._exit = held_.pop_all()
 
     def begin(self, task: str) -> None:
         """Begin an episode in which `task`, a sentence, is done; one that was begun before is forgotten."""
         self.discard()
-        self._task, folder = task, beside(self.root, "episode")
-        try:
-            folder.mkdir()
-            self._videos = {
-                name: Video(folder / f"{name}.mp4", feature, self._fps)
-                for name, feature in self._features.items()
-                if feature.is_video
-            }
-        except (OSError, extra("av").FFmpegError) as error:
-            raise self._unwritable(error) from error
+        self._task, self.length = task, 0
+        with self._writable():
+            self._folder.mkdir()
+            for name, feature in self._features.items():
+                if feature.is_video:
+                    self._videos[name] = Video(self._folder / f"{name}.mp4", feature, self._fps)
         self._rows = {name: [] for name, feature in self._features.items() if not feature.is_video}
         self._kept: dict[str, list[Any]] = {name: [] for name in self._rows if len(self._features[name].shape) == 1}
-        self.length = 0
 
     def add(self, frame: Mapping[str, Any]) -> None:
         """Append a frame: a value for each feature.
@@ -172,24 +137,21 @@ class DatasetWriter:
             DatasetError: a value is missing, has another shape, or is not finite; the frame is not recorded.
             OutputError: it cannot be written; the episode is lost, and the data set as it was.
         """
-        values: dict[str, np.ndarray[Any, Any]] = {}
+        values: dict[str, NDArray[Any]] = {}
         for name, feature in self._features.items():
-            value = np.asarray(frame[name] if name in frame else np.nan)
+            value = np.asarray(frame.get(name, np.nan))
             if value.shape != feature.shape or not (feature.is_video or np.isfinite(value).all()):
                 raise DatasetError(f"The {name} of a frame is finite and of shape {feature.shape}, not {value.shape}.")
-            values[name] = value.astype(np.uint8 if feature.is_video else feature.dtype, copy=False)
-        try:
+            values[name] = value.astype(np.uint8 if feature.is_video else feature.dtype)
+        with self._writable():
             for name, video in self._videos.items():
                 video.add(values[name])
             for name, rows in self._rows.items():
-                rows.append(values[name].copy())
-                if name in self._kept:
-                    self._kept[name].append(rows[-1])
+                rows.append(values[name])
+                self._kept.get(name, []).append(values[name])
             self.length += 1
             if self.length % BATCH == 0:
                 self._flush()
-        except (OSError, extra("av").FFmpegError) as error:
-            raise self._unwritable(error) from error
 
     def finish(self) -> int:
         """Complete the episode and put it into the data set; returns its number.
@@ -198,24 +160,20 @@ class DatasetWriter:
             DatasetError: it has no frames.
             OutputError: it cannot be written; the data set is as it was.
         """
-        if not self._rows or not self.length:
-            self.discard()
-            raise DatasetError("An episode without frames is no episode.")
-        folder = beside(self.root, "episode")
         try:
-            self._flush()
-            self._table.close()
-            self._table = None
-            stats = {name: statistics(np.array(rows)) for name, rows in self._kept.items()}
-            for name, video in self._videos.items():
-                video.finish()
-                stats[name] = picture_statistics(video.counts, self.length)
-            videos = {name: folder / f"{name}.mp4" for name in self._videos}
-            old = drafts(DatasetFolder(self.root)) if self.episodes else []
-            new = Draft([self._task], self.length, folder / "data.parquet", videos, stats)
-            compose(self.root, [*old, new], self._features, self._fps, self._about)
-        except (OSError, extra("av").FFmpegError) as error:
-            raise self._unwritable(error) from error
+            if not self._rows or not self.length:
+                raise DatasetError("An episode without frames is no episode.")
+            with self._writable():
+                self._flush()
+                self._table.close()
+                stats = {name: schema.statistics(np.array(rows)) for name, rows in self._kept.items()}
+                for name, video in self._videos.items():
+                    video.finish()
+                    stats[name] = schema.picture_statistics(video.counts, self.length)
+                videos = {name: self._folder / f"{name}.mp4" for name in self._videos}
+                new = Draft([self._task], self.length, self._folder / "data.parquet", videos, stats)
+                old = drafts(DatasetFolder(self.root)) if self.episodes else []
+                compose(self.root, [*old, new], self._features, self._fps, self._about)
         finally:
             self.discard()
         self.episodes += 1
@@ -229,7 +187,7 @@ class DatasetWriter:
             with suppress(Exception):
                 self._table.close()
         self._videos, self._rows, self._table = {}, {}, None
-        shutil.rmtree(beside(self.root, "episode"), ignore_errors=True)
+        shutil.rmtree(self._folder, ignore_errors=True)
 
     def close(self) -> None:
         """Forget what is not finished, and let others write."""
@@ -237,73 +195,67 @@ class DatasetWriter:
         self._exit.close()
 
     def _flush(self) -> None:
-        count = len(next(iter(self._rows.values())))
+        """Write the rows that wait, numbered as of an episode that has no number yet."""
+        pa, count = extra("pyarrow"), len(next(iter(self._rows.values())))
         if not count and self._table is not None:
             return
-        first = self.length - count
-        columns = {name: rows for name, rows in self._rows.items()}
-        table = frames_table(columns, self._features, first, self._fps)
+        columns = {name: _column(np.array(values), self._features[name]) for name, values in self._rows.items()}
+        at = np.arange(self.length - count, self.length)
+        columns["timestamp"] = pa.array((at / self._fps).astype(np.float32))
+        columns |= {name: pa.array(at) for name in ("frame_index", "index")}
+        columns |= {name: pa.array(np.zeros_like(at)) for name in ("episode_index", "task_index")}
+        table = pa.table(columns)
         if self._table is None:
-            path = beside(self.root, "episode") / "data.parquet"
+            path = self._folder / "data.parquet"
             self._table = extra("pyarrow.parquet").ParquetWriter(path, table.schema, compression="zstd")
         self._table.write_table(table)
         self._rows = {name: [] for name in self._rows}
 
-    def _unwritable(self, error: Exception) -> OutputError:
-        self.discard()
-        why = getattr(error, "strerror", None) or error
-        return OutputError(f"Cannot write an episode of {self.root}: {why}; those that were finished are kept.")
+    @contextmanager
+    def _writable(self) -> Iterator[None]:
+        """Forget the episode where something in here cannot be written, and say so."""
+        try:
+            yield
+        except (OSError, extra("av").FFmpegError) as error:
+            self.discard()
+            why = getattr(error, "strerror", None) or error
+            kept = "those that were finished are kept"
+            raise OutputError(f"Cannot write an episode of {self.root}: {why}; {kept}.") from error
 
 
-def frames_table(rows: Mapping[str, Sequence[Any]], features: Mapping[str, Feature], first: int, fps: int) -> Any:
-    """Return frames as a table, numbered from `first` in an episode that has no number yet."""
+def _column(values: NDArray[Any], feature: Feature) -> Any:
+    """Return the Arrow column of (n, ...) values."""
     pa = extra("pyarrow")
-    n = len(next(iter(rows.values())))
-    columns = {name: _column(np.array(values), features[name]) for name, values in rows.items()}
-    at = np.arange(first, first + n)
-    columns["timestamp"] = pa.array((at / fps).astype(np.float32))
-    columns |= {name: pa.array(at) for name in ("frame_index", "index")}
-    columns |= {name: pa.array(np.zeros(n, np.int64)) for name in ("episode_index", "task_index")}
-    return pa.table(columns)
-
-
-def _column(values: np.ndarray[Any, Any], feature: Feature) -> Any:
-    pa = extra("pyarrow")
-    flat = pa.array(values.reshape(-1))
-    if feature.shape == (1,):
-        return flat
+    flat, n = pa.array(values.reshape(-1)), len(values)
     if len(feature.shape) == 1:
-        return pa.FixedSizeListArray.from_arrays(flat, feature.shape[0])
-    n, (height, width) = len(values), feature.shape
-    lines = pa.ListArray.from_arrays(pa.array(np.arange(0, n * height * width + 1, width, dtype=np.int32)), flat)
-    return pa.ListArray.from_arrays(pa.array(np.arange(0, n * height + 1, height, dtype=np.int32)), lines)
+        return flat if feature.shape == (1,) else pa.FixedSizeListArray.from_arrays(flat, feature.shape[0])
+    for size in (feature.shape[1] * np.arange(n * feature.shape[0] + 1), feature.shape[0] * np.arange(n + 1)):
+        flat = pa.ListArray.from_arrays(pa.array(size.astype(np.int32)), flat)
+    return flat
 
 
 def drafts(dataset: DatasetFolder, chosen: Sequence[int] | None = None) -> list[Draft]:
     """Return episodes of a data set, by default all, as those of another one.
 
     Raises:
-        DatasetError: there is no such episode, or one has no file of its own.
+        DatasetError: there is no such episode, a file of one is missing, or it is in a file with others.
     """
     out: list[Draft] = []
-    owners: dict[str, int] = {}
-    for episode in dataset.episodes:
-        path = episode.data_file(dataset.info["data_path"])
-        owners[path] = owners.get(path, 0) + 1
-    for index in range(len(dataset.episodes)) if chosen is None else chosen:
+    files = [episode.data_file(dataset.info["data_path"]) for episode in dataset.episodes]
+    for index in range(len(files)) if chosen is None else chosen:
         episode = dataset.episode(index)
-        data = episode.data_file(dataset.info["data_path"])
-        if owners[data] > 1:
+        if files.count(files[index]) > 1:
             raise DatasetError(
-                f"{dataset.root / data} holds several episodes; only data sets with a file per episode, as "
+                f"{dataset.root / files[index]} holds several episodes; only data sets with a file per episode, as "
                 "GOLEM writes them, are changed here; lerobot-edit-dataset of the package lerobot changes others."
             )
+        data = dataset.root / files[index]
         videos = {v: dataset.root / episode.video_file(dataset.info["video_path"], v) for v in dataset.videos}
-        missing = next((path for path in (dataset.root / data, *videos.values()) if not path.exists()), None)
+        missing = next((path for path in (data, *videos.values()) if not path.exists()), None)
         if missing is not None:
             raise DatasetError(f"{missing} of episode {index} is missing.")
         starts = {v: float(episode.row[f"videos/{v}/from_timestamp"]) for v in dataset.videos}
-        out.append(Draft(episode.tasks, episode.length, dataset.root / data, videos, episode.statistics(), starts))
+        out.append(Draft(episode.tasks, episode.length, data, videos, episode.statistics(), starts))
     return out
 
 
@@ -326,9 +278,8 @@ def compose(
     with replaced(root) as new:
         first = 0
         for k, episode in enumerate(episodes):
-            at = {"chunk_index": k // CHUNK, "file_index": k % CHUNK}
-            target = new / DATA.format(**at)
-            _renumbered(episode, target, k, first, tasks)
+            at = {"chunk_index": k // schema.CHUNK, "file_index": k % schema.CHUNK}
+            _renumbered(episode, new / schema.DATA.format(**at), k, first, tasks.index(episode.tasks[0]))
             row: dict[str, Any] = {
                 "episode_index": k, "tasks": episode.tasks, "length": episode.length,
                 "dataset_from_index": first, "dataset_to_index": first + episode.length,
@@ -336,58 +287,54 @@ def compose(
             }  # fmt: skip
             row |= {f"data/{name}": value for name, value in at.items()}
             for key, path in episode.videos.items():
-                link(path, new / VIDEO.format(video_key=key, **at))
+                link(path, new / schema.VIDEO.format(video_key=key, **at))
                 start = episode.starts.get(key, 0.0)
-                row |= {f"videos/{key}/{name}": value for name, value in at.items()}
-                row |= {f"videos/{key}/from_timestamp": start}
-                row |= {f"videos/{key}/to_timestamp": start + episode.length / fps}
+                span = {"from_timestamp": start, "to_timestamp": start + episode.length / fps}
+                row |= {f"videos/{key}/{name}": value for name, value in (at | span).items()}
             row |= {f"stats/{name}/{k}": v for name, each in episode.stats.items() for k, v in each.items()}
             rows.append(row)
             first += episode.length
-        (new / EPISODES / "chunk-000").mkdir(parents=True)
-        pq.write_table(pa.Table.from_pylist(rows), new / EPISODES / "chunk-000" / "file-000.parquet")
-        pq.write_table(tasks_table(tasks), new / TASKS)
-        names = [n for n in episodes[0].stats if all(n in e.stats for e in episodes)]
-        _write_json(new / STATS, {name: pooled([e.stats[name] for e in episodes]) for name in names})
-        _write_json(new / ABOUT, about)
+        (new / schema.EPISODES / "chunk-000").mkdir(parents=True)
+        pq.write_table(pa.Table.from_pylist(rows), new / schema.EPISODES / "chunk-000" / "file-000.parquet")
+        pq.write_table(schema.tasks_table(tasks), new / schema.TASKS)
+        known = [n for n in episodes[0].stats if all(n in e.stats for e in episodes)]
+        _write_json(new / schema.STATS, {name: schema.pooled([e.stats[name] for e in episodes]) for name in known})
+        _write_json(new / schema.ABOUT, about)
         info = {
-            "codebase_version": VERSION, "robot_type": ROBOT, "total_episodes": len(rows), "total_frames": first,
-            "total_tasks": len(tasks), "chunks_size": CHUNK, "data_files_size_in_mb": 100,
-            "video_files_size_in_mb": 200, "fps": fps, "splits": {"train": f"0:{len(rows)}"}, "data_path": DATA,
-            "video_path": VIDEO if episodes[0].videos else None, "features": described(features, fps),
+            "codebase_version": schema.VERSION, "robot_type": schema.ROBOT, "total_episodes": len(rows),
+            "total_frames": first, "total_tasks": len(tasks), "chunks_size": schema.CHUNK,
+            "data_files_size_in_mb": 100, "video_files_size_in_mb": 200, "fps": fps,
+            "splits": {"train": f"0:{len(rows)}"}, "data_path": schema.DATA,
+            "video_path": schema.VIDEO if episodes[0].videos else None,
+            "features": schema.described(features, fps),
         }  # fmt: skip
-        _write_json(new / INFO, info)
+        _write_json(new / schema.INFO, info)
 
 
-def _renumbered(episode: Draft, target: Path, index: int, first: int, tasks: Sequence[str]) -> None:
+def _renumbered(episode: Draft, target: Path, index: int, first: int, task: int) -> None:
     """Put the data of an episode at `target`, with its numbers; linked where it has them already."""
     pa, pq = extra("pyarrow"), extra("pyarrow.parquet")
     target.parent.mkdir(parents=True, exist_ok=True)
-    task = tasks.index(episode.tasks[0])
+    wanted = {"episode_index": index, "index": first, "task_index": task}
     with pq.ParquetFile(episode.data) as source:
-        head = next(source.iter_batches(1, columns=["episode_index", "index", "task_index"])).to_pylist()[0]
-        if (head["episode_index"], head["index"], head["task_index"]) == (index, first, task):
+        if next(source.iter_batches(1, columns=list(wanted))).to_pylist()[0] == wanted:
             link(episode.data, target)
             return
         with pq.ParquetWriter(target, source.schema_arrow, compression="zstd") as out:
             for group in range(source.num_row_groups):
                 table = source.read_row_group(group)
-                n, at = table.num_rows, table.column_names.index
-                new = {
-                    "episode_index": np.full(n, index), "index": table["frame_index"].to_numpy() + first,
-                    "task_index": np.full(n, task),
-                }  # fmt: skip
-                for name, values in new.items():
-                    table = table.set_column(at(name), name, pa.array(values.astype(np.int64)))
+                frames = table["frame_index"].to_numpy()
+                for name, value in wanted.items():
+                    values = value + (frames if name == "index" else np.zeros_like(frames))
+                    table = table.set_column(table.column_names.index(name), name, pa.array(values))
                 out.write_table(table)
 
 
 def _write_json(path: Path, value: Any) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(json.dumps(value, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
 def rewritten(dataset: DatasetFolder, root: Path, episodes: Sequence[Draft]) -> None:
     """Let `root` be a data set like `dataset` of `episodes`; errors as for `compose`."""
     with held(root):
-        compose(root, episodes, read_features(dataset.info), dataset.fps, dataset.about)
+        compose(root, episodes, schema.read_features(dataset.info), dataset.fps, dataset.about)

@@ -13,16 +13,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from golem.capabilities.policies.vectors import ACTION, COMMAND, EFFORT, STATE
 from golem.errors import ConfigError, GolemError, MissingExtra
-from golem.types import CameraInfo
 
-VERSION = "v3.0"
-ROBOT = "unitree_h1_2_magpie"
-"""Robot type of our data sets."""
-CHUNK = 1000
-"""Files of a folder."""
+VERSION, ROBOT, CHUNK = "v3.0", "unitree_h1_2_magpie", 1000
+"""Of the format, of our data sets, and files of a folder."""
 DATA = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 VIDEO = "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4"
 INFO, STATS, TASKS, EPISODES = "meta/info.json", "meta/stats.json", "meta/tasks.parquet", "meta/episodes"
@@ -30,17 +27,8 @@ ABOUT = "meta/golem.json"
 """Units, labels of masks, and where it is from: what the format has no place for."""
 VECTORS = {"observation.state": STATE, "observation.effort": EFFORT, "action": ACTION, "command.joints": COMMAND}
 """Feature -> names and units."""
-INDICES = {
-    "timestamp": "float32",
-    "frame_index": "int64",
-    "episode_index": "int64",
-    "index": "int64",
-    "task_index": "int64",
-}
+INDICES = {"timestamp": "float32", **dict.fromkeys(("frame_index", "episode_index", "index", "task_index"), "int64")}
 """What every data set has beside its features, with their types."""
-CODEC, GOP, CRF = "libsvtav1", 10, 30
-"""Encoder (BSD, as LeRobot's own), distance of key frames, quality [own: 11 ms of CPU a VGA frame; LeRobot's
-distance of 2 takes 60]."""
 
 
 class DatasetError(GolemError):
@@ -61,42 +49,26 @@ def extra(name: str) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class Feature:
-    """One feature.
-
-    Attributes:
-        dtype: `video`, or a NumPy type.
-        shape: of one frame's value.
-        names: of a vector's entries, or of the axes.
-        units: of a vector's entries.
-    """
+    """One feature: `dtype` is `video` or NumPy's, `shape` that of a frame's value, `names` of its entries or axes."""
 
     dtype: str
     shape: tuple[int, ...]
     names: Sequence[str] | None = None
-    units: Sequence[str] = ()
 
     @property
     def is_video(self) -> bool:
         """Whether its frames are in a video."""
         return self.dtype == "video"
 
-    def column(self) -> Any:
-        """Return the Arrow type of its column."""
-        pa = extra("pyarrow")
-        kind = pa.type_for_alias(self.dtype)
-        if self.shape == (1,):
-            return kind
-        return pa.list_(kind, self.shape[0]) if len(self.shape) == 1 else pa.list_(pa.list_(kind))
-
     def described(self, fps: int) -> dict[str, Any]:
         """Return what info.json says of it."""
         names = None if self.names is None else list(self.names)
         out: dict[str, Any] = {"dtype": self.dtype, "shape": list(self.shape), "names": names}
         if self.is_video:
-            height, width, channels = self.shape
             out["info"] = {
-                "video.height": height, "video.width": width, "video.codec": "av1", "video.pix_fmt": "yuv420p",
-                "video.is_depth_map": False, "video.fps": fps, "video.channels": channels, "has_audio": False,
+                "video.height": self.shape[0], "video.width": self.shape[1], "video.codec": "av1",
+                "video.pix_fmt": "yuv420p", "video.is_depth_map": False, "video.fps": fps,
+                "video.channels": self.shape[2], "has_audio": False,
             }  # fmt: skip
         return out
 
@@ -107,32 +79,30 @@ class Recipe:
 
     Attributes:
         fps: frames per second of robot time.
-        cameras: pictures of these.
+        cameras: pictures of these, with width and height [px].
         depth: whether with their depth, uint16 [mm].
         masks: labels whose masks are recorded for each camera, as uint8: 0 is nothing, k the k-th label.
     """
 
     fps: int = 15
-    cameras: Mapping[str, CameraInfo] = field(default_factory=dict[str, CameraInfo])
+    cameras: Mapping[str, tuple[int, int]] = field(default_factory=dict[str, tuple[int, int]])
     depth: bool = False
     masks: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        if not 1 <= self.fps <= 500:
-            raise ConfigError(f"A data set has 1 to 500 frames per second, not {self.fps}.")
-        if len(self.masks) > 255:
-            raise ConfigError(f"A mask has up to 255 labels, not {len(self.masks)}.")
+        if not 1 <= self.fps <= 500 or len(self.masks) > 255:
+            raise ConfigError(
+                f"A data set has 1 to 500 frames a second, not {self.fps}, and masks of up to 255 labels."
+            )
 
     def features(self) -> dict[str, Feature]:
         """Return its features by name."""
-        out = {k: Feature("float32", (len(v),), list(v), list(v.values())) for k, v in VECTORS.items()}
-        for name, info in self.cameras.items():
-            size = info.height, info.width
-            out[f"observation.images.{name}"] = Feature("video", (*size, 3), ("height", "width", "channels"))
-            if self.depth:
-                out[f"observation.depth.{name}"] = Feature("uint16", size, ("height", "width"))
-            if self.masks:
-                out[f"observation.masks.{name}"] = Feature("uint8", size, ("height", "width"))
+        out = {name: Feature("float32", (len(entries),), list(entries)) for name, entries in VECTORS.items()}
+        for name, (width, height) in self.cameras.items():
+            out[f"observation.images.{name}"] = Feature("video", (height, width, 3), ("height", "width", "channels"))
+            for kind, dtype, wanted in (("depth", "uint16", self.depth), ("masks", "uint8", self.masks)):
+                if wanted:
+                    out[f"observation.{kind}.{name}"] = Feature(dtype, (height, width), ("height", "width"))
         return out
 
 
@@ -144,16 +114,13 @@ def described(features: Mapping[str, Feature], fps: int) -> dict[str, Any]:
 
 def read_features(info: Mapping[str, Any]) -> dict[str, Feature]:
     """Return the features that info.json names, without those that every data set has."""
-    return {
-        name: Feature(each["dtype"], tuple(each["shape"]), _flat(each.get("names")))
-        for name, each in info["features"].items()
-        if name not in INDICES
-    }
-
-
-def _flat(names: Any) -> list[str] | None:
-    """Return names as a list; some data sets group them, as `{"motors": [...]}`."""
-    return [str(n) for group in names.values() for n in group] if isinstance(names, dict) else names
+    out: dict[str, Feature] = {}
+    for name, each in info["features"].items():
+        names = each.get("names")
+        if isinstance(names, dict):  # some data sets group them, as `{"motors": [...]}`
+            names = [str(n) for group in names.values() for n in group]
+        out[name] = Feature(each["dtype"], tuple(each["shape"]), names)
+    return {name: feature for name, feature in out.items() if name not in INDICES}
 
 
 def tasks_table(tasks: Sequence[str]) -> Any:
@@ -171,22 +138,19 @@ def tasks_table(tasks: Sequence[str]) -> Any:
 QUANTILES = {"q01": 0.01, "q10": 0.1, "q50": 0.5, "q90": 0.9, "q99": 0.99}
 
 
-def statistics(values: np.ndarray[Any, Any]) -> dict[str, Any]:
-    """Return what is known of the (n, ...) values of a feature, each of one frame's shape, and the count."""
-    x = values.reshape(len(values), -1).astype(np.float64)
-    quantiles = np.quantile(x, list(QUANTILES.values()), axis=0)
-    out = {"min": x.min(0), "max": x.max(0), "mean": x.mean(0), "std": x.std(0)}
-    out |= dict(zip(QUANTILES, quantiles, strict=True))
+def statistics(values: NDArray[Any]) -> dict[str, Any]:
+    """Return what is known of the (n, m) values of a feature, by the names that LeRobot has for it."""
+    x = values.astype(np.float64)
+    quantiles = dict(zip(QUANTILES, np.quantile(x, list(QUANTILES.values()), axis=0), strict=True))
+    out = {"min": x.min(0), "max": x.max(0), "mean": x.mean(0), "std": x.std(0), **quantiles}
     return {k: v.tolist() for k, v in out.items()} | {"count": [len(x)]}
 
 
-def picture_statistics(counts: np.ndarray[Any, Any], frames: int) -> dict[str, Any]:
+def picture_statistics(counts: NDArray[Any], frames: int) -> dict[str, Any]:
     """Return the same of pictures, by channel, from their histogram (3, 256), from 0 to 1 as LeRobot has them."""
-    level = np.arange(256) / 255.0
-    share = counts / counts.sum(1, keepdims=True)
-    mean = share @ level
+    level, share = np.arange(256) / 255.0, counts / counts.sum(1, keepdims=True)
+    mean, below = share @ level, share.cumsum(1)
     rows = {"mean": mean, "std": np.sqrt(np.maximum(share @ level**2 - mean**2, 0.0))}
-    below = share.cumsum(1)
     for name, q in {"min": 1e-12, "max": 1.0 - 1e-12, **QUANTILES}.items():
         rows[name] = level[np.minimum((below < q).sum(1), 255)]
     return {k: v.reshape(3, 1, 1).tolist() for k, v in rows.items()} | {"count": [frames]}
@@ -199,6 +163,5 @@ def pooled(episodes: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     weight = (n / n.sum()).reshape(-1, *[1] * (stacked["mean"].ndim - 1))
     out = {key: (weight * value).sum(0) for key, value in stacked.items()}
     out["min"], out["max"] = stacked["min"].min(0), stacked["max"].max(0)
-    spread = (weight * (stacked["std"] ** 2 + (stacked["mean"] - out["mean"]) ** 2)).sum(0)
-    out["std"] = np.sqrt(spread)
+    out["std"] = np.sqrt((weight * (stacked["std"] ** 2 + (stacked["mean"] - out["mean"]) ** 2)).sum(0))
     return {key: value.tolist() for key, value in out.items()} | {"count": [int(n.sum())]}

@@ -16,25 +16,12 @@ from golem.datasets.schema import ABOUT, DATA, EPISODES, INFO, TASKS, VERSION, D
 
 @dataclass(frozen=True, slots=True)
 class RecordedEpisode:
-    """One episode.
-
-    Attributes:
-        index: its number.
-        row: all that meta/episodes says of it.
-    """
+    """One episode: its number, how many frames it has, what was done, and all that meta/episodes says of it."""
 
     index: int
+    length: int
+    tasks: list[str]
     row: Mapping[str, Any]
-
-    @property
-    def length(self) -> int:
-        """How many frames it has."""
-        return int(self.row["length"])
-
-    @property
-    def tasks(self) -> list[str]:
-        """What was done."""
-        return list(self.row["tasks"])
 
     def data_file(self, path: str) -> str:
         """Return its file of data by the pattern of info.json."""
@@ -60,11 +47,10 @@ class DatasetFolder:
 
     Attributes:
         root: its folder.
-        info: what info.json says.
-        about: what golem.json says; empty in a data set of others.
-        features: by name.
-        tasks: in their order.
-        episodes: in their order.
+        info, about: what info.json and golem.json say; the second is empty in a data set of others.
+        fps: frames per second.
+        features: by name; `videos` are those that are in videos.
+        tasks, episodes: in their order.
     """
 
     def __init__(self, root: Path) -> None:
@@ -74,9 +60,7 @@ class DatasetFolder:
             DatasetError: there is none, it is of another version, empty, or its metadata is damaged.
             MissingExtra: the extra `data` is not installed.
         """
-        pq = extra("pyarrow.parquet")
-        self.root = root
-        self.info: dict[str, Any] = self._json(INFO)
+        pq, self.root, self.info = extra("pyarrow.parquet"), root, _read_json(root, INFO)
         version = self.info.get("codebase_version")
         if version != VERSION:
             raise DatasetError(
@@ -84,32 +68,28 @@ class DatasetFolder:
                 "lerobot.datasets.v30.convert_dataset_v21_to_v30` of the package lerobot converts one of v2.1."
             )
         try:
-            self.features = read_features(self.info)
-            self.fps = int(self.info["fps"])
+            self.features, self.fps = read_features(self.info), int(self.info["fps"])
             files = sorted((root / EPISODES).glob("*/*.parquet"))
-            rows = [row for file in files for row in pq.read_table(file).to_pylist()]
+            rows = sorted((r for f in files for r in pq.read_table(f).to_pylist()), key=lambda r: r["episode_index"])
+            self.episodes = [
+                RecordedEpisode(int(r["episode_index"]), int(r["length"]), list(r["tasks"]), r) for r in rows
+            ]
             tasks = pq.read_table(root / TASKS).to_pydict()
             words = next(v for k, v in tasks.items() if k != "task_index")
             self.tasks = [words[tasks["task_index"].index(k)] for k in range(len(words))]
-            self.episodes = [
-                RecordedEpisode(int(r["episode_index"]), r) for r in sorted(rows, key=lambda r: r["episode_index"])
-            ]
-            lengths = sum(episode.length for episode in self.episodes)
         except (KeyError, ValueError, TypeError, OSError, StopIteration, extra("pyarrow").ArrowException) as error:
             raise DatasetError(f"The metadata of the data set {root} is damaged: {error!r}.") from error
-        self.about: dict[str, Any] = self._json(ABOUT) if (root / ABOUT).exists() else {}
-        if not self.episodes or not lengths:
+        self.about = _read_json(root, ABOUT) if (root / ABOUT).exists() else {}
+        self.videos = [name for name, feature in self.features.items() if feature.is_video]
+        found, said = len(self.episodes), self.info.get("total_episodes")
+        frames, told = sum(episode.length for episode in self.episodes), self.info.get("total_frames")
+        if not frames:
             raise DatasetError(f"The data set {root} has no frames; record an episode first.")
-        if (len(self.episodes), lengths) != (self.info.get("total_episodes"), self.info.get("total_frames")):
+        if (found, frames) != (said, told):
             raise DatasetError(
-                f"The data set {root} has {len(self.episodes)} episodes of {lengths} frames, and its info.json says "
-                f"{self.info.get('total_episodes')} of {self.info.get('total_frames')}: a writer was ended halfway."
+                f"The data set {root} has {found} episodes of {frames} frames, and its info.json says {said} of {told}: "
+                "a writer was ended halfway."
             )
-
-    @property
-    def videos(self) -> list[str]:
-        """The features that are in videos."""
-        return [name for name, feature in self.features.items() if feature.is_video]
 
     def require(self, *names: str, like: Mapping[str, Sequence[str]] | None = None) -> None:
         """Check that it has features, vectors with the names that `like` gives for them.
@@ -144,26 +124,24 @@ class DatasetFolder:
         Raises:
             DatasetError: its file is missing or damaged.
         """
-        path = self.root / episode.data_file(self.info.get("data_path") or DATA)
-        pq, only = extra("pyarrow.parquet"), [("episode_index", "=", episode.index)]
+        path, only = self.root / episode.data_file(self.info.get("data_path") or DATA), episode.index
         try:
-            table = pq.read_table(path, columns=None if columns is None else list(columns), filters=only)
+            table = extra("pyarrow.parquet").read_table(
+                path, columns=None if columns is None else list(columns), filters=[("episode_index", "=", only)]
+            )
         except (OSError, ValueError, extra("pyarrow").ArrowException) as error:
-            raise DatasetError(f"The frames of episode {episode.index} cannot be read from {path}: {error}.") from error
+            raise DatasetError(f"The frames of episode {only} cannot be read from {path}: {error}.") from error
         if table.num_rows != episode.length:
-            raise DatasetError(f"{path} has {table.num_rows} frames of episode {episode.index}, not {episode.length}.")
+            raise DatasetError(f"{path} has {table.num_rows} frames of episode {only}, not {episode.length}.")
         return table
 
     def values(self, episode: RecordedEpisode, name: str) -> NDArray[Any]:
         """Return the values (n, ...) of one feature of an episode that is in no video; errors as for `table`."""
         column = self.table(episode, [name, "episode_index"])[name].combine_chunks()
-        while hasattr(column, "flatten"):
-            column = column.flatten() if hasattr(column.type, "value_type") else column
-            if not hasattr(column.type, "value_type"):
-                break
+        while hasattr(column.type, "value_type"):
+            column = column.flatten()
         shape = self.features[name].shape if name in self.features else (1,)
-        flat = column.to_numpy(zero_copy_only=False)
-        return flat.reshape(episode.length, *shape) if shape != (1,) else flat.reshape(episode.length)
+        return column.to_numpy(zero_copy_only=False).reshape(episode.length, *(() if shape == (1,) else shape))
 
     def pictures(self, episode: RecordedEpisode, name: str) -> Iterator[NDArray[np.uint8]]:
         """Yield the pictures (height, width, 3) of one video of an episode, in order.
@@ -171,30 +149,25 @@ class DatasetFolder:
         Raises:
             DatasetError: the video is missing, damaged, or ends too early.
         """
-        path = self.root / episode.video_file(self.info["video_path"], name)
-        first = float(episode.row[f"videos/{name}/from_timestamp"])
-        count, av = 0, extra("av")
+        path, av = self.root / episode.video_file(self.info["video_path"], name), extra("av")
+        first, count = float(episode.row[f"videos/{name}/from_timestamp"]), 0
         try:
             with av.open(str(path)) as video:
                 for frame in video.decode(video=0):
                     # Pictures of other episodes may be in the same file.
-                    if frame.time is not None and frame.time < first - 0.5 / self.fps:
-                        continue
-                    if count == episode.length:
-                        break
-                    count += 1
-                    yield frame.to_ndarray(format="rgb24")
+                    if count < episode.length and (frame.time is None or frame.time > first - 0.5 / self.fps):
+                        count += 1
+                        yield frame.to_ndarray(format="rgb24")
         except (OSError, av.FFmpegError) as error:
             raise DatasetError(f"The video {path} of episode {episode.index} cannot be read: {error}.") from error
         if count < episode.length:
             raise DatasetError(f"The video {path} ends after {count} of the {episode.length} frames of its episode.")
 
-    def _json(self, name: str) -> dict[str, Any]:
-        path = self.root / name
-        try:
-            value = json.loads(path.read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            raise DatasetError(f"{self.root} is no data set of LeRobot's: {path} cannot be read ({error}).") from error
-        if not isinstance(value, dict):
-            raise DatasetError(f"{path} holds no map.")
-        return value
+
+def _read_json(root: Path, name: str) -> dict[str, Any]:
+    path = root / name
+    try:
+        value = json.loads(path.read_text(encoding="utf-8"))
+        return {**value}
+    except (OSError, ValueError, TypeError) as error:
+        raise DatasetError(f"{root} is no data set of LeRobot's: {path} cannot be read ({error}).") from error

@@ -9,7 +9,7 @@ import os
 import shutil
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
 from golem.errors import OutputError
@@ -28,7 +28,7 @@ def held(root: Path) -> Iterator[None]:
     """
     try:
         root.parent.mkdir(parents=True, exist_ok=True)
-        lock = (root.parent / f".{root.name}.lock").open("w")
+        lock = beside(root, "lock").open("w")
     except OSError as error:
         raise OutputError(f"Cannot write {root}: {error.strerror}.") from error
     with lock:
@@ -44,7 +44,7 @@ def held(root: Path) -> Iterator[None]:
 
 
 def beside(root: Path, name: str) -> Path:
-    """Return the hidden folder beside `root` that serves for `name`."""
+    """Return what is hidden beside the folder `root` and serves for `name`."""
     return root.parent / f".{root.name}.{name}"
 
 
@@ -57,17 +57,12 @@ def replaced(root: Path) -> Iterator[Path]:
     """
     new = beside(root, "new")
     try:
-        shutil.rmtree(new, ignore_errors=True)
         new.mkdir(parents=True)
         yield new
         for folder, _, files in os.walk(new):
-            for name in files:
-                sync(Path(folder, name))
-            sync(Path(folder))
-        if root.exists():
-            _exchange(new, root)
-        else:
-            os.rename(new, root)
+            for path in (*(Path(folder, name) for name in files), Path(folder)):
+                sync(path)
+        _exchange(new, root)
         sync(root.parent)
     except OSError as error:
         raise OutputError(f"Cannot write {root}: {error.strerror or error}; what was there is unchanged.") from error
@@ -97,17 +92,15 @@ def sync(path: Path) -> None:
 
 def _exchange(new: Path, root: Path) -> None:
     """Exchange two folders in one step, or, where the system has none, in two; `held` mends what ends between them."""
-    libc = ctypes.CDLL(None, use_errno=True)
-    a, b = os.fsencode(new), os.fsencode(root)
-    with suppress(AttributeError):
-        if sys.platform == "darwin":
-            failed = libc.renamex_np(a, b, _SWAP)
-        else:
-            failed = libc.renameat2(_HERE, a, _HERE, b, _SWAP)
-        if not failed:
+    if not root.exists():
+        os.rename(new, root)
+        return
+    libc, (a, b) = ctypes.CDLL(None, use_errno=True), (os.fsencode(new), os.fsencode(root))
+    if hasattr(libc, "renameat2") or sys.platform == "darwin":
+        mac = sys.platform == "darwin"
+        if not (libc.renamex_np(a, b, _SWAP) if mac else libc.renameat2(_HERE, a, _HERE, b, _SWAP)):
             return
-        code = ctypes.get_errno()
-        if code not in _UNABLE:
+        if (code := ctypes.get_errno()) not in _UNABLE:
             raise OSError(code, os.strerror(code))
     old = beside(root, "old")
     os.rename(root, old)

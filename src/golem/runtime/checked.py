@@ -85,7 +85,7 @@ class CheckedSeeingLaw(CheckedServoLaw):
     def __init__(self, law: SeeingLaw, contract: ContractCheck) -> None:
         """Watch `law`."""
         super().__init__(law, contract)
-        self.cameras, self.width, self.prompt, self._see = law.cameras, law.width, law.prompt, law.see
+        self.cameras, self.width, self._see = law.cameras, law.width, law.see
 
     def see(
         self, t: float, side: Side, T_odom_base: Array, observe: Callable[[], dict[str, Any] | None], live: bool

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import ExitStack, suppress
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 
 from golem.capabilities.grasping.base import Grasp, GraspMethod, SeeingLaw, ServoLaw, ServoStatus, ServoStep
+from golem.capabilities.policies.observer import Observer
+from golem.interfaces import topics
 from golem.interfaces.payloads import GripState
 from golem.skills.base import SkillCancelled, SkillResult, StageFailed
 from golem.skills.context import Context
@@ -27,7 +29,6 @@ from golem.skills.pick_config import (
 )
 from golem.skills.pick_place import look_after, place
 from golem.skills.pick_targets import SAME, Attempt, PickChoice, TargetChoice
-from golem.skills.policy_view import PolicyView
 from golem.skills.poses import floor_places, lifted, moved, retracted, stands_at
 from golem.skills.stance_choice import stance_here
 from golem.skills.travel import LineTravel, PlannedTravel, Travel
@@ -304,15 +305,15 @@ class Pick:
         closing, camera, self._seen = False, f"{attempt.side}_hand", None
         below = await ForceGuard.at_rest(context, attempt.side, arm.commanded[:3, 2], self._config.press_force)
         room = FingerRoom(context, attempt.side, gap)
-        with ExitStack() as open_:
-            eye = open_.enter_context(context.watch(camera, attempt.label, doubtful=(attempt.label,)))
-            view = None
-            if isinstance(law, SeeingLaw):
-                view = open_.enter_context(PolicyView(context, law.cameras, law.width, law.prompt))
+        observer = None
+        if isinstance(law, SeeingLaw):
+            observer = Observer(context.bus, law.cameras, law.width, topics.rgbd_images)
+        with context.watch(camera, attempt.label, doubtful=(attempt.label,)) as eye:
             while context.t < end and not (closing and hand.status.state in CLOSED):
                 fresh = eye.fresh()
-                if isinstance(law, SeeingLaw) and view is not None:
-                    law.see(context.t, attempt.side, context.T_odom_base, view, context.modules.worker is not None)
+                if isinstance(law, SeeingLaw) and observer is not None:
+                    live = context.modules.worker is not None
+                    law.see(context.t, attempt.side, context.T_odom_base, observer.observation, live)
                 step = law.step(context.t, None if fresh is None else list(fresh.objects), arm.pose)
                 self._seen = followed(self._seen, step)
                 if not closing:

@@ -124,12 +124,10 @@ class SeeingLaw(ServoLaw, Protocol):
 
     Attributes:
         cameras: whose pictures it wants, `width` pixels wide; 0 is as they are.
-        prompt: what is to be done, for who listens.
     """
 
     cameras: tuple[str, ...]
     width: int
-    prompt: str
 
     def see(
         self, t: float, side: Side, T_odom_base: Array, observe: Callable[[], dict[str, Any] | None], live: bool

@@ -9,11 +9,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
+import numpy as np
+
 from golem.capabilities.policies.onnx_policy import OnnxPolicy
 from golem.capabilities.policies.openpi import PolicyLinkConfig, PolicyServer
-from golem.capabilities.policies.vectors import check_actions
+from golem.capabilities.policies.vectors import ActionRefused, check_actions
 from golem.errors import ServiceUnavailable
 from golem.types import Array
+
+C = TypeVar("C", bound=PolicyLinkConfig)
 
 
 class ActionPolicy(Protocol):
@@ -26,9 +30,6 @@ class ActionPolicy(Protocol):
             ServiceUnavailable: there is no answer.
         """
         ...
-
-
-C = TypeVar("C", bound=PolicyLinkConfig)
 
 
 def open_policy(config: C) -> tuple[PolicyServer | OnnxPolicy, C]:
@@ -44,6 +45,17 @@ def open_policy(config: C) -> tuple[PolicyServer | OnnxPolicy, C]:
     return policy, replace(config, cameras=(policy.camera,), fps=policy.fps)
 
 
+def check_near(goal: Array, pose: Array, far: float) -> None:
+    """Check that a hand at `pose` may be meant to go to `goal`, (4, 4) each, `far` away at most [m].
+
+    Raises:
+        ActionRefused: it is further.
+    """
+    away = float(np.linalg.norm(goal[:3, 3] - pose[:3, 3]))
+    if away > far:
+        raise ActionRefused(f"The policy sends a hand {away:.2f} m away in one step; {far:g} m is the most.")
+
+
 class ActionStream:
     """Asks a policy on a thread of its own, and says which action is due.
 
@@ -51,9 +63,9 @@ class ActionStream:
     counts when it comes. Its i-th action is for t + i / fps: those that are over by then are left out.
     """
 
-    def __init__(self, policy: ActionPolicy, config: PolicyLinkConfig) -> None:
-        """Ask `policy`."""
-        self._policy, self._config = policy, config
+    def __init__(self, policy: ActionPolicy, config: PolicyLinkConfig, prompt: str = "") -> None:
+        """Ask `policy` to do `prompt`."""
+        self._policy, self._config, self._prompt = policy, config, prompt
         self._pool = ThreadPoolExecutor(1, "policy")
         self._job: tuple[Future[Any], float] | None = None
         self._chunk: Array | None = None
@@ -84,7 +96,7 @@ class ActionStream:
         if self._job is None and (self._chunk is None or index >= min(c.use, len(self._chunk))):
             seen = observe()
             if seen is not None:
-                self._job = self._pool.submit(self._policy.infer, seen), t
+                self._job = self._pool.submit(self._policy.infer, {**seen, "prompt": self._prompt}), t
                 if not live and c.latency == 0.0:
                     return self.step(t, observe, live)
         return None if self._chunk is None else self._chunk[min(max(index, 0), len(self._chunk) - 1)]
