@@ -109,4 +109,4 @@ def test_a_recorder_keeps_the_last_stretch_of_its_stages() -> None:
     for t, stage in enumerate(("detect", "servo", "servo", "approach", "servo", "pull")):
         bus.publish(topics.FEEDBACK, Feedback(float(t), "pick", stage, ""), float(t))
         node.step(float(t))
-    assert calls == ["begin", "add", "add", "begin", "add"] and node.frames
+    assert calls == ["begin", "add", "add", "begin", "add"] and node.begun

@@ -15,6 +15,7 @@ from typing import Any, ClassVar
 import numpy as np
 import pinocchio as pin
 
+from golem.capabilities.arms.steps import led
 from golem.capabilities.policies.observer import Observer
 from golem.datasets.sampling import recipe
 from golem.errors import ConfigError, MissingExtra, unknown_name
@@ -83,8 +84,10 @@ class GolemEnv(gym.Env[dict[str, Any], Array]):
             rung: one of `RUNGS`.
             profile: realism of sensors and world.
             ladder_seed: seed of the ladder whose trials these are.
-            period, limit: robot time of a step and of an episode [s].
-            cameras, width: whose pictures are observed, so many pixels wide.
+            period: robot time of a step [s].
+            limit: robot time of an episode [s].
+            cameras: whose pictures are observed.
+            width: of them [px].
             use: slot -> implementation that replaces the rung's.
             options: of the rung.
 
@@ -240,16 +243,6 @@ class _Errand:
         heights = context.legs.status.heights if context.legs.reporting else None
         height = None if heights is None else float(np.clip(heights[1] + DROP * action[17], heights[0], heights[2]))
         context.legs.drive(Twist(*(BASE * action[14:17]).tolist(), height))
-
-
-def led(goal: Array, pose: Array, step: Array, lead: float) -> Array:
-    """Return `goal` (4, 4), moved by `step` (3,) [m], no further ahead of `pose` than `lead` [m], its rotation made one."""
-    ahead = goal[:3, 3] + step - pose[:3, 3]
-    u, _, v = np.linalg.svd(goal[:3, :3])
-    out = np.eye(4)
-    out[:3, :3] = u @ v
-    out[:3, 3] = pose[:3, 3] + ahead * min(1.0, lead / max(float(np.linalg.norm(ahead)), 1e-9))
-    return out
 
 
 def register() -> None:

@@ -87,7 +87,7 @@ class DatasetFolder:
             raise DatasetError(f"The data set {root} has no frames; record an episode first.")
         if (found, frames) != (said, told):
             raise DatasetError(
-                f"The data set {root} has {found} episodes of {frames} frames, and its info.json says {said} of {told}: "
+                f"The data set {root} has {found} episodes of {frames} frames, and info.json says {said} of {told}: "
                 "a writer was ended halfway."
             )
 

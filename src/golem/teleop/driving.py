@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pinocchio as pin
 
+from golem.capabilities.arms.steps import led
 from golem.interfaces import topics
 from golem.robots.model.magpie_model import MAX_GAP
 from golem.skills.base import SkillCancelled, SkillResult
@@ -16,18 +17,13 @@ from golem.skills.served_policy import FORCE
 from golem.teleop.pilot import HandPilot, Wish
 from golem.types import SIDES, Array, PlanarPose, Side, Twist
 
-LEAD = 0.10
-"""How far a palm target that is moved by rates may run ahead of the hand [m] [own]."""
-FAR = 0.6
-"""Distance of a dragged goal from the hand from which on it is refused [m] [own]: nobody means that."""
-SPEED = 0.25
-"""Speed of a hand on its way to a goal [m/s]."""
+LEAD, FAR, SHORT = 0.10, 0.6, 0.02
+"""How far a target that is moved by rates may run ahead of the hand, distance of a dragged goal from which on it is
+refused, and of a target that an arm is said not to reach [m] [own]."""
+SPEED, ACCELERATION = 0.25, 5.0
+"""Of a palm target on its way [m/s], [m/s^2] [own]: it is v / a behind, 30 ms at the fastest of keys and sticks."""
 BOX = np.array([[-0.1, 0.8], [-0.9, 0.9], [-0.6, 0.8]])
 """Where palm targets may be in base_link [m] [own: what an arm of 0.75 m reaches, and not behind the back]."""
-ACCELERATION = 5.0
-"""Of a palm target on its way [m/s^2] [own]: it is v / a behind, 30 ms at the fastest of keys and sticks."""
-SHORT = 0.02
-"""Distance from its target at which an arm is said not to reach it [m]."""
 SHUT = 0.005
 """Opening below which a hand closes [m]."""
 
@@ -48,10 +44,8 @@ class Driving:
         self._grips: dict[Side, float] = {}
         self._gripped: dict[Side, tuple[int, Array, Array]] = {}
         self._height: float | None = None
-        self._waist = 0.0
-        self._moved = False
-        self._stood = PlanarPose(0.0, 0.0, 0.0)
-        self._speed = SPEED
+        self._waist, self._moved, self._speed = 0.0, False, SPEED
+        self._stood = np.eye(4)
 
     async def run(self, context: Context, goal: object) -> SkillResult:
         """Drive until it is cancelled; see `Routine`."""
@@ -60,90 +54,75 @@ class Driving:
         self._waist = float(context.joints[0])
         try:
             while True:
-                self._tick(context, self._pilot.wish(self._clock()))
+                self._carry(context)
+                wish = self._pilot.wish(self._clock())
+                if wish.moves:
+                    self._drive(context, wish)
+                else:
+                    self._hold(context)
+                self._moved = wish.moves
                 await context.tick()
         except SkillCancelled:
             context.legs.drive(Twist(height=self._height))
             raise
 
-    def _tick(self, context: Context, wish: Wish) -> None:
-        self._carry(context)
-        if not wish.moves:
-            self._hold(context)
-            return
-        self._moved = True
-        self._waist = float(np.clip(self._waist + wish.waist * context.period, -0.5, 0.5))
-        context.torso = self._waist if wish.waist or context.torso is not None else None
-        for side in SIDES:
-            self._palm(context, side, wish)
-            grip = wish.grips.get(side)
-            if grip is not None and grip != self._grips.get(side):
-                self._grips[side], hand = grip, context.hands[side]
-                hand.close(FORCE) if grip < SHUT else hand.open(min(grip, MAX_GAP))
-        heights = context.legs.status.heights if context.legs.reporting else None
-        if heights is not None and wish.lift:
-            before = heights[1] if self._height is None else self._height
-            self._height = float(np.clip(before + wish.lift * context.period, heights[0], heights[2]))
-        vx, vy, wz = wish.twist.tolist()
-        context.legs.drive(Twist(vx, vy, wz, self._height))
-
     def _carry(self, context: Context) -> None:
         """Take the goals along while the robot walks: they are the pilot's, who goes with it."""
-        stands = PlanarPose.of(context.T_odom_base)
+        stands = PlanarPose.of(context.T_odom_base).matrix()
         walks = context.legs.reporting and context.legs.status.moving
         self._speed = 2.0 * SPEED if walks else SPEED
         if walks:
-            step = stands.matrix() @ np.linalg.inv(self._stood.matrix())
+            step = stands @ np.linalg.inv(self._stood)
             self.goals = {side: None if goal is None else step @ goal for side, goal in self.goals.items()}
         self._stood = stands
 
     def _hold(self, context: Context) -> None:
         """Stay: targets that run ahead of the hands come back to them, and the base stands."""
-        if self._moved:
-            self._moved = False
-            self._gripped.clear()
-            for side in SIDES:
-                if self.goals[side] is not None:
-                    self.goals[side] = context.arms[side].commanded.copy()
-        for side in SIDES:
-            goal = self.goals[side]
+        for side, goal in self.goals.items():
             if goal is not None:
-                context.arms[side].approach(goal, self._speed, ACCELERATION)
+                arm = context.arms[side]
+                self.goals[side] = goal = arm.commanded.copy() if self._moved else goal
+                arm.approach(goal, self._speed, ACCELERATION)
+        self._gripped.clear()
         context.legs.drive(Twist(height=self._height))
 
+    def _drive(self, context: Context, wish: Wish) -> None:
+        self._waist = float(np.clip(self._waist + wish.waist * context.period, -0.5, 0.5))
+        context.torso = self._waist if wish.waist or context.torso is not None else None
+        for side in SIDES:
+            self._palm(context, side, wish)
+            grip, hand = wish.grips.get(side), context.hands[side]
+            if grip is not None and grip != self._grips.get(side):
+                self._grips[side] = grip
+                hand.close(FORCE) if grip < SHUT else hand.open(min(grip, MAX_GAP))
+        heights = context.legs.status.heights if context.legs.reporting else None
+        if heights is not None and wish.lift:
+            before = heights[1] if self._height is None else self._height
+            self._height = float(np.clip(before + wish.lift * context.period, heights[0], heights[2]))
+        context.legs.drive(Twist(*wish.twist.tolist(), self._height))
+
     def _palm(self, context: Context, side: Side, wish: Wish) -> None:
-        arm, T, dt = context.arms[side], context.T_odom_base, context.period
-        goal, self.refused[side] = self.goals[side], ""
-        rate = wish.rates[side]
+        arm, T, dt, goal = context.arms[side], context.T_odom_base, context.period, self.goals[side]
+        rate, why = wish.rates.get(side, np.zeros(6)), ""
         if side in wish.goals:
-            goal = wish.goals[side]
-            far = float(np.linalg.norm(goal[:3, 3] - arm.pose[:3, 3]))
-            if far > FAR:
-                self.refused[side] = f"{far:.2f} m away: too far"
-                goal = self.goals[side]
+            far = float(np.linalg.norm(wish.goals[side][:3, 3] - arm.pose[:3, 3]))
+            goal, why = (wish.goals[side], "") if far < FAR else (goal, f"{far:.2f} m away: too far")
         elif side in wish.devices:
             goal = self._follow(context, side, *wish.devices[side])
         elif np.abs(rate).max() > 1e-6:
-            goal = arm.commanded.copy() if goal is None else goal.copy()
-            ahead = goal[:3, 3] + dt * (T[:3, :3] @ rate[:3]) - arm.pose[:3, 3]
-            goal[:3, 3] = arm.pose[:3, 3] + ahead * min(1.0, LEAD / max(float(np.linalg.norm(ahead)), 1e-9))
-            R = pin.exp3(dt * (T[:3, :3] @ rate[3:])) @ goal[:3, :3]
-            u, _, v = np.linalg.svd(R)
-            goal[:3, :3] = u @ v
-        if goal is None:
-            return
-        inside = T[:3, :3].T @ (goal[:3, 3] - T[:3, 3])
-        kept = np.clip(inside, BOX[:, 0], BOX[:, 1])
-        if np.abs(kept - inside).max() > 1e-6:
-            self.refused[side] = "outside the work space"
-            goal = goal.copy()
-            goal[:3, 3] = T[:3, :3] @ kept + T[:3, 3]
-        self.goals[side] = goal
-        arm.approach(goal, self._speed, ACCELERATION)
-        command = context.bus.latest(topics.ARM_COMMAND)
-        if command is not None and not self.refused[side]:
-            short = float(command.error_position[SIDES.index(side)])
-            self.refused[side] = f"the arm ends {100.0 * short:.0f} cm before it" if short > SHORT else ""
+            goal = led(arm.commanded if goal is None else goal, arm.pose, dt * (T[:3, :3] @ rate[:3]), LEAD)
+            goal[:3, :3] = pin.exp3(dt * (T[:3, :3] @ rate[3:])) @ goal[:3, :3]
+        if goal is not None:
+            inside = T[:3, :3].T @ (goal[:3, 3] - T[:3, 3])
+            kept = np.clip(inside, BOX[:, 0], BOX[:, 1])
+            if np.abs(kept - inside).max() > 1e-6:
+                goal, why = goal.copy(), "outside the work space"
+                goal[:3, 3] = T[:3, :3] @ kept + T[:3, 3]
+            arm.approach(goal, self._speed, ACCELERATION)
+            command = context.bus.latest(topics.ARM_COMMAND)
+            short = 0.0 if command is None else float(command.error_position[SIDES.index(side)])
+            why = why or (f"the arm ends {100.0 * short:.0f} cm before it" if short > SHORT else "")
+        self.goals[side], self.refused[side] = goal, why
 
     def _follow(self, context: Context, side: Side, grip: int, device: Array) -> Array:
         """Return where a palm goes that follows a tracked device from where both were when the clutch was gripped."""

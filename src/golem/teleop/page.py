@@ -7,26 +7,20 @@ import json
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from importlib.resources import files
 from typing import Any
 
-from golem.dashboard.server import LOCAL
 from golem.errors import ConfigError, MissingExtra
-from golem.middleware.web_gate import TokenGate, is_loopback
+from golem.middleware.web_gate import LOCAL, TokenGate, is_loopback
 from golem.teleop.pilot import BadMessage, HandPilot
 
-MOST = 4096
-"""Bytes of a message."""
-WINDOWS = 16
-"""Windows at once."""
+MOST, WINDOWS = 4096, 16
+"""Bytes of a message, and windows at once."""
 
 
 class PilotPage:
-    """Serves the page, and hears its windows.
-
-    Attributes:
-        url: where to open it.
-    """
+    """Serves the page at `url`, and hears its windows."""
 
     def __init__(self, pilot: HandPilot, host: str, port: int, view: str, status: Callable[[], dict[str, Any]]) -> None:
         """Serve at `host` and `port`, with the live view at `view` in it, and tell windows the `status`.
@@ -37,19 +31,19 @@ class PilotPage:
         """
         try:
             from websockets.datastructures import Headers
+            from websockets.exceptions import ConnectionClosed
             from websockets.http11 import Response
             from websockets.sync.server import serve
         except ModuleNotFoundError as error:
             raise MissingExtra(error.name or "websockets", "view") from error
         self._pilot, self._status, self._numbers = pilot, status, itertools.count(1)
-        self._room = threading.BoundedSemaphore(WINDOWS)
+        self._room, self._gone = threading.BoundedSemaphore(WINDOWS), (ConnectionClosed, OSError)
         body = (files("golem.teleop") / "pilot.html").read_text(encoding="utf-8").replace("%VIEW%", view).encode()
         headers = Headers({"Content-Type": "text/html; charset=utf-8", "Content-Length": str(len(body))})
 
         def page(connection: Any, request: Any) -> Any:
-            if request.headers.get("Upgrade", "").lower() == "websocket":
-                return None
-            return Response(200, "OK", headers, body)
+            asks = request.headers.get("Upgrade", "").lower() == "websocket"
+            return None if asks else Response(200, "OK", headers, body)
 
         local = is_loopback(host)
         try:
@@ -70,25 +64,21 @@ class PilotPage:
 
     def _serve(self, connection: Any) -> None:
         """Hear one window until it is gone."""
-        from websockets.exceptions import ConnectionClosed
-
         if not self._room.acquire(blocking=False):
             connection.close(1013, "There are too many windows.")
             return
         who = f"window {next(self._numbers)}"
         try:
-            while True:
-                raw = connection.recv()
-                error = ""
-                try:
-                    self._pilot.hear(who, json.loads(raw, parse_constant=_no_constant), time.monotonic())
-                except (BadMessage, ValueError, RecursionError) as wrong:
-                    self._pilot.leave(who)
-                    error = str(wrong) or "That is no JSON."
-                state = self._pilot.state
-                connection.send(json.dumps({"you": who, "pilot": state, "error": error, **self._status()}))
-        except (ConnectionClosed, OSError):
-            pass
+            with suppress(*self._gone):
+                while True:
+                    raw, error = connection.recv(), ""
+                    try:
+                        self._pilot.hear(who, json.loads(raw, parse_constant=_no_constant), time.monotonic())
+                    except (BadMessage, ValueError, RecursionError) as wrong:
+                        self._pilot.leave(who)
+                        error = str(wrong) or "That is no JSON."
+                    told = {"you": who, "pilot": self._pilot.state, "error": error, **self._status()}
+                    connection.send(json.dumps(told))
         finally:
             self._pilot.leave(who)
             self._room.release()

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from golem.errors import GolemError
 from golem.options import require
@@ -16,8 +17,6 @@ from golem.types import SIDES, Array, Side
 
 SILENCE = 0.25
 """Age of the newest message from which on a held switch counts as let go [s] [own: five messages of a page]."""
-AXES = 6
-"""A palm's velocity: three of translation, three of rotation, in base_link, from -1 to 1."""
 
 
 class BadMessage(GolemError):
@@ -31,8 +30,7 @@ class PilotConfig:
     Attributes:
         speed, turn: of a palm at full deflection [m/s], [rad/s].
         walk, side, spin: of the base at full deflection [m/s], [m/s], [rad/s].
-        lift: of its height [m/s].
-        waist: of the torso [rad/s].
+        lift, waist: of its height [m/s] and of the torso [rad/s].
         scale: movement of the hand per movement of a tracked device, while the clutch is held.
     """
 
@@ -66,7 +64,7 @@ class Wish:
     """
 
     moves: bool = False
-    rates: dict[Side, Array] = field(default_factory=lambda: {side: np.zeros(AXES) for side in SIDES})
+    rates: dict[Side, Array] = field(default_factory=dict[Side, Array])
     devices: dict[Side, tuple[int, Array]] = field(default_factory=dict[Side, tuple[int, Array]])
     goals: dict[Side, Array] = field(default_factory=dict[Side, Array])
     grips: dict[Side, float] = field(default_factory=dict[Side, float])
@@ -80,7 +78,7 @@ class _Window:
     heard: float
     hold: bool = False
     said: Mapping[str, Any] = field(default_factory=dict[str, Any])
-    clutch: dict[Side, int] = field(default_factory=lambda: dict.fromkeys(SIDES, 0))
+    clutch: int = 0
     dragged: dict[Side, Array] = field(default_factory=dict[Side, Array])
 
 
@@ -89,16 +87,16 @@ class HandPilot:
 
     A window that holds its switch while no other does has control until it lets go. Where two hold theirs nobody has
     control, until all have let go.
+
+    Attributes:
+        state: who has control: a window's name, empty for nobody, or `two` where two want it.
     """
 
     def __init__(self, config: PilotConfig | None = None) -> None:
         """Start without windows."""
-        self.config = config or PilotConfig()
+        self.config, self.state = config or PilotConfig(), ""
         self._windows: dict[str, _Window] = {}
-        self._lock = threading.Lock()
-        self._chosen = ""
-        self._fight = False
-        self.orders: list[str] = []
+        self._lock, self._orders = threading.Lock(), list[str]()
 
     def hear(self, who: str, message: object, now: float) -> None:
         """Take a message of the window `who` at `now` [s], by a clock that never jumps.
@@ -109,13 +107,11 @@ class HandPilot:
         with self._lock:
             window = self._windows.setdefault(who, _Window(now))
             window.heard, window.hold, window.said = now, False, {}
-            said = checked(message)
-            for side in SIDES:
-                if "device" in said.get(side, {}) and not said.get("hold"):
-                    window.clutch[side] += 1
-            window.hold, window.said = bool(said.get("hold")), said
-            if isinstance(said.get("order"), str) and len(self.orders) < 8:
-                self.orders.append(said["order"])
+            said = window.said = checked(message)
+            window.hold = bool(said.get("hold"))
+            window.clutch += not window.hold
+            if isinstance(said.get("order"), str) and len(self._orders) < 8:
+                self._orders.append(said["order"])
 
     def drag(self, who: str, side: Side, T_odom: Array | None, now: float) -> None:
         """Take where a gizmo is dragged to, (4, 4) in odom; None lets it go. It is held as long as it is dragged."""
@@ -132,35 +128,30 @@ class HandPilot:
         with self._lock:
             self._windows.pop(who, None)
 
-    @property
-    def state(self) -> str:
-        """Who has control: a window's name, `""` for nobody, or `"two"` where two want it."""
-        return "two" if self._fight else self._chosen
-
     def take_order(self) -> str:
         """Return the oldest order, a word, that has not been taken; empty where there is none."""
         with self._lock:
-            return self.orders.pop(0) if self.orders else ""
+            return self._orders.pop(0) if self._orders else ""
 
     def wish(self, now: float) -> Wish:
         """Return what is wanted at `now` [s]."""
         with self._lock:
             holding = [who for who, w in self._windows.items() if w.hold and now - w.heard < SILENCE]
-            self._fight = len(holding) > 1 or (self._fight and bool(holding))
-            self._chosen = "" if self._fight or not holding else holding[0]
-            if not self._chosen:
-                return Wish()
-            window = self._windows[self._chosen]
-            return self._read(window.said, dict(window.dragged), window.clutch)
+            fight = len(holding) > 1 or (self.state == "two" and bool(holding))
+            self.state = "two" if fight else holding[0] if holding else ""
+            return Wish() if fight or not holding else self._read(self._windows[self.state])
 
-    def _read(self, said: Mapping[str, Any], dragged: dict[Side, Array], clutch: Mapping[Side, int]) -> Wish:
-        c, wish = self.config, Wish(True, goals=dragged)
+    def _read(self, window: _Window) -> Wish:
+        c, said, wish = self.config, window.said, Wish(True, goals=dict(window.dragged))
         for side in SIDES:
             part = said.get(side, {})
             if "v" in part:
                 wish.rates[side] = np.array(part["v"], float) * np.repeat((c.speed, c.turn), 3)
             if "device" in part:
-                wish.devices[side] = clutch[side], pose_of(part["device"])
+                T = np.eye(4)
+                T[:3, 3] = part["device"][:3]
+                T[:3, :3] = Rotation.from_quat(part["device"][3:], scalar_first=True).as_matrix()
+                wish.devices[side] = window.clutch, T
             if "grip" in part:
                 wish.grips[side] = float(part["grip"])
         wish.twist = np.array(said.get("twist", (0.0, 0.0, 0.0)), float) * (c.walk, c.side, c.spin)
@@ -168,21 +159,9 @@ class HandPilot:
         return wish
 
 
-def pose_of(numbers: list[float]) -> Array:
-    """Return the (4, 4) pose of position and quaternion wxyz."""
-    w, x, y, z = np.array(numbers[3:]) / np.linalg.norm(numbers[3:])
-    T = np.eye(4)
-    T[:3, 3] = numbers[:3]
-    T[:3, :3] = (
-        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
-        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
-        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
-    )
-    return T
-
-
-_SIZES = {"v": (AXES, 1.0), "device": (7, 10.0), "grip": (0, 0.2)}
+_HAND = {"v": (6, 1.0), "device": (7, 10.0), "grip": (0, 0.2)}
 _WHOLE = {"twist": (3, 1.0), "lift": (0, 1.0), "waist": (0, 1.0)}
+"""Key -> how many numbers, 0 for one that stands alone, and their greatest size."""
 
 
 def checked(message: object) -> Mapping[str, Any]:
@@ -191,26 +170,16 @@ def checked(message: object) -> Mapping[str, Any]:
     Raises:
         BadMessage: it does not.
     """
-    if not isinstance(message, dict):
-        raise BadMessage("A message is a map.")
-    for side in SIDES:
-        if not isinstance(message.get(side, {}), dict):
-            raise BadMessage(f"'{side}' is a map.")
-        _numbers(message.get(side, {}), _SIZES)
-    _numbers(message, _WHOLE)
-    for side in SIDES:
-        device = message.get(side, {}).get("device")
-        if device is not None and not 0.5 < np.linalg.norm(device[3:]) < 2.0:
-            raise BadMessage("The quaternion of a device has length 1.")
+    if not isinstance(message, dict) or not all(isinstance(message.get(side, {}), dict) for side in SIDES):
+        raise BadMessage("A message is a map, and each hand's part is one.")
+    for part, sizes in ((message, _WHOLE), *((message.get(side, {}), _HAND) for side in SIDES)):
+        for name, (size, most) in sizes.items():
+            if name not in part:
+                continue
+            value = part[name] if size else [part[name]]
+            fine = isinstance(value, list) and len(value) == max(size, 1)
+            if not fine or not all(type(x) in (int, float) and abs(x) <= most for x in value):
+                raise BadMessage(f"'{name}' is {size or 'one'} number{'s' * bool(size)} from {-most:g} to {most:g}.")
+            if name == "device" and not 0.5 < np.linalg.norm(value[3:]) < 2.0:
+                raise BadMessage("The quaternion of a device has length 1.")
     return message
-
-
-def _numbers(part: Mapping[str, Any], sizes: Mapping[str, tuple[int, float]]) -> None:
-    for name, (size, most) in sizes.items():
-        if name not in part:
-            continue
-        value = part[name]
-        values = value if size and isinstance(value, list) else [value]
-        fine = all(isinstance(x, int | float) and not isinstance(x, bool) and abs(x) <= most for x in values)
-        if not fine or len(values) != max(size, 1) or (size and not isinstance(value, list)):
-            raise BadMessage(f"'{name}' is {size or 'one'} number{'s' if size else ''} from {-most:g} to {most:g}.")

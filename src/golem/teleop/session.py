@@ -11,7 +11,8 @@ from typing import Annotated, Any
 from tyro.conf import OmitArgPrefixes, Positional, arg
 
 from golem.dashboard.live import LiveView
-from golem.datasets.commands import PictureOptions
+from golem.datasets.commands import TASK, PictureOptions
+from golem.datasets.episode_writer import DatasetWriter
 from golem.datasets.sampling import StackRecorder
 from golem.interfaces import topics
 from golem.run import no_display, shown
@@ -43,54 +44,11 @@ class TeleopConfig:
     """Address that both listen on; 0.0.0.0 lets other machines in that know the tokens in the printed addresses."""
     dataset: Path | None = None
     """Data set that demonstrations are recorded into, by the buttons of the page."""
-    task: str = "Take a loose screw and drop it in the tray."
+    task: str = TASK
     """What is demonstrated, as a sentence."""
     pilot: PilotConfig = field(default_factory=PilotConfig)
     """How strong keys and sticks are."""
     pictures: OmitArgPrefixes[PictureOptions] = field(default_factory=PictureOptions)
-
-
-class Demonstrations:
-    """Records what is driven, as the pilot orders: `record`, `keep`, `drop`; a node of the executor.
-
-    Attributes:
-        words: how it stands, for people.
-    """
-
-    def __init__(self, running: LockstepRunner, root: Path, config: TeleopConfig) -> None:
-        """Open the data set in `root`; errors as for `DatasetWriter`."""
-        from golem.datasets.episode_writer import DatasetWriter
-
-        self._recipe = config.pictures.recipe()
-        self.period = 1.0 / self._recipe.fps
-        self._writer, self._bus, self._task = (
-            DatasetWriter(root, self._recipe, "golem teleop"),
-            running.bus,
-            config.task,
-        )
-        self._recorder: StackRecorder | None = None
-        self.words = f"{self._writer.episodes} episodes"
-
-    def order(self, word: str) -> None:
-        """Do what was ordered."""
-        recorder, self._recorder = self._recorder, None
-        if word == "record":
-            self._recorder = StackRecorder(self._writer, self._recipe, self._bus, self._task)
-            self.words = "recording"
-            return
-        if word == "keep" and recorder is not None and recorder.frames:
-            self._writer.finish()
-        self._writer.discard()
-        self.words = f"{self._writer.episodes} episodes"
-
-    def step(self, t: float) -> None:
-        """Record a frame."""
-        if self._recorder is not None:
-            self._recorder.step(t)
-
-    def close(self) -> None:
-        """Let the data set go; what was not kept is dropped."""
-        self._writer.close()
 
 
 class Teleop:
@@ -102,18 +60,21 @@ class Teleop:
     """
 
     def __init__(self, config: TeleopConfig, running: LockstepRunner, robot: Any) -> None:
-        """Serve; errors as for `LiveView`, `PilotPage` and `Demonstrations`."""
-        self._running, self._next = running, 0.0
+        """Serve; errors as for `LiveView`, `PilotPage` and `DatasetWriter`."""
+        self._running, self._next, self._config, self._recipe = running, 0.0, config, config.pictures.recipe()
         self.pilot = HandPilot(config.pilot)
         self.driving = Driving(self.pilot)
+        self._writer: DatasetWriter | None = None
+        self._recorder: StackRecorder | None = None
+        self.period = 1.0 / self._recipe.fps
         with ExitStack() as opened:
             self.view = opened.enter_context(LiveView(running, shown(running, robot), config.port, config.host))
             server, seen = self.view.shown
             self._gizmos = Gizmos(server, seen.from_odom, self.pilot, self.driving)
-            self.demonstrations = None
             if config.dataset is not None:
-                self.demonstrations = opened.enter_context(closing(Demonstrations(running, config.dataset, config)))
-                running.executor.add(self.demonstrations)
+                writer = DatasetWriter(config.dataset, self._recipe, "golem teleop")
+                self._writer = opened.enter_context(closing(writer))
+                running.executor.add(self)
             port = config.port and config.port + 1
             page = PilotPage(self.pilot, config.host, port, self.view.url, self.status)
             self.page = opened.enter_context(closing(page))
@@ -121,17 +82,26 @@ class Teleop:
 
     def status(self) -> dict[str, Any]:
         """Return what the windows are told."""
-        gate = self._running.safety
+        gate, writer = self._running.safety, self._writer
         why = "" if gate is None or not gate.stopped else f"The safety gate has stopped the robot: {gate.why}."
-        episode = "" if self.demonstrations is None else self.demonstrations.words
+        episode = "" if writer is None else "recording" if self._recorder else f"{writer.episodes} episodes"
         return {"refused": self.driving.refused, "gate": why, "episode": episode, "t": self._running.executor.t}
+
+    def step(self, t: float) -> None:
+        """Record a frame where somebody asked for it; a node of the executor."""
+        if self._recorder is not None:
+            self._recorder.step(t)
 
     def watch(self) -> None:
         """Look after gizmos and orders; after every tick."""
-        word = self.pilot.take_order()
-        if word and self.demonstrations is not None:
-            self.demonstrations.order(word)
-        t = self._running.executor.t
+        word, writer, t = self.pilot.take_order(), self._writer, self._running.executor.t
+        if word and writer is not None:
+            recorder, self._recorder = self._recorder, None
+            if word == "keep" and recorder is not None and recorder.begun:
+                writer.finish()
+            writer.discard()
+            if word == "record":
+                self._recorder = StackRecorder(writer, self._recipe, self._running.bus, self._config.task)
         if t >= self._next and self._running.bus.latest(topics.LOW_STATE) is not None:
             self._next = t + SHOWN
             self._gizmos.show({side: self._running.commanded(side) for side in SIDES})
