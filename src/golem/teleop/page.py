@@ -53,7 +53,7 @@ class PilotPage:
             )  # fmt: skip
         except (OSError, OverflowError) as error:
             raise ConfigError(
-                f"Cannot serve the pilot's page at {host}:{port} ({error}); choose another port."
+                f"Cannot serve the page at {host}:{port} ({error}); choose another port."
             ) from error
         inside = int(self._server.socket.getsockname()[1])
         self._gate = None if local else TokenGate(host, port, inside)
