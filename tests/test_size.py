@@ -6,15 +6,9 @@ from pathlib import Path
 
 from tests.sources import SOURCE
 
-<<<<<<< HEAD
-ALL = 107_304
+ALL = 106_799
 """Lines of the package [own: 100,000 is the goal; lower this with every line that goes]."""
-ON_A_ROBOT = 68_498
-=======
-ALL = 98_824
-"""Lines of the package [own: 92,000 is the goal; lower this with every line that goes]."""
-ON_A_ROBOT = 62_689
->>>>>>> ad72cbaa (The bounds of the size are what it is now)
+ON_A_ROBOT = 68_002
 """Lines of what a robot runs [own: 62,000 is the goal]."""
 NOT_ON_A_ROBOT = ("evaluation", "training", "dashboard", "demo.py", "demo_walk.py", "run.py")
 ENGINES = ("mujoco", "physx", "isaaclab", "replay", "worlds")

@@ -52,9 +52,7 @@ class PilotPage:
                 process_request=page, max_size=MOST, compression=None, ping_interval=1.0, ping_timeout=1.0,
             )  # fmt: skip
         except (OSError, OverflowError) as error:
-            raise ConfigError(
-                f"Cannot serve the page at {host}:{port} ({error}); choose another port."
-            ) from error
+            raise ConfigError(f"Cannot serve the page at {host}:{port} ({error}); choose another port.") from error
         inside = int(self._server.socket.getsockname()[1])
         self._gate = None if local else TokenGate(host, port, inside)
         self.url = f"http://{host}:{inside}/"
