@@ -18,6 +18,8 @@ from golem.skills.walk import WalkGoal
 from golem.stack import load_stack
 from golem.types import SIDES, UPPER, Array
 
+EVERY = 0.01
+"""Time between two looks at the force [s], as /wrench is sent."""
 PUSHES = ((8.0, 0, 0), (-8.0, 0, 0), (0, 8.0, 0), (0, -8.0, 0), (0, 0, 8.0), (0, 0, -8.0))
 """In the world [N], each for 1 s."""
 
@@ -47,24 +49,24 @@ def main(seconds: float) -> None:
 
     def run(length: float) -> list[Array]:
         rows: list[Array] = []
-        running.executor.run(running.executor.t + length, lambda: (tick(), rows.append(felt(running, force)), False)[2])
+        for _ in range(round(length / EVERY)):
+            running.executor.run(running.executor.t + EVERY, lambda: tick() is not None)
+            rows.append(felt(running, force))
         return rows
 
-    running.executor.run(3.0, lambda: (tick(), False)[1])
-    if running.safety is None:
-        return
+    run(3.0)
     events.clear()
     quiet = run(seconds)
     print(f"standing {seconds:g} s, nothing touched: {len(events)} events")
     errors, delays = list[Array](), list[float]()
     for push in PUSHES:
-        before = np.mean(quiet[-250:], axis=0)
+        before = np.mean(quiet[-50:], axis=0)
         events.clear()
         start = running.executor.t
         pushed[:] = push
         rows = run(1.0)
         delays += [min((t for t, s in events if s == side), default=np.inf) - start for side in SIDES]
-        means = np.array([np.mean(rows[k : k + 25], axis=0) for k in range(250, 475, 25)])  # of 50 ms, as /wrench is
+        means = np.array([np.mean(rows[k : k + 5], axis=0) for k in range(50, 95, 5)])  # of 50 ms, as /wrench is
         errors.append((-(means - before) - push).reshape(-1, 3))
         pushed[:] = 0.0
         quiet = run(1.5)
