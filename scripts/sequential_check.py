@@ -151,7 +151,7 @@ def main() -> None:
     rng = np.random.default_rng(options.seed)
     studies = options.studies
     parts = [
-        f"*Type-I error and loss of coverage at any of {MOST} trials, in percent (5 allowed). {studies:,} simulated "
+        f"*Type-I error and loss of coverage at any of {MOST} trials, in percent (5 allowed). {studies:,} "
         f"studies a cell, seed {options.seed}.*",
         "\n".join(errors(rng, studies)),
         f"*Pairs that 20 points take. {studies:,} simulated studies a row, error 5 %, at most {MOST} pairs.*",
