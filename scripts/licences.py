@@ -51,7 +51,9 @@ def locks() -> dict[str, tuple[str, list[str]]]:
 
 def licence(package: Distribution) -> str:
     """Return what the metadata say: the expression, else the classifiers, else the first line of the text."""
-    said = {key: package.metadata.get_all(key) or [""] for key in ("License-Expression", "License", "Classifier")}
+    said: dict[str, list[str]] = {
+        key: package.metadata.get_all(key) or [""] for key in ("License-Expression", "License", "Classifier")
+    }
     expression = said["License-Expression"][0]
     trove = [c.rpartition(" :: ")[2] for c in said["Classifier"] if c.startswith("License ::")]
     names = [SHORT.get(c, c) for c in trove if c != "OSI Approved"]

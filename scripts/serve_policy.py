@@ -8,6 +8,7 @@ It runs in the environment of the policy, with `msgpack`, `websockets` and `nump
 On the robot: golem ladder --method '{use: policy, port: 8000, cameras: [right_hand], width: 160}'
 """
 
+# pyright: reportMissingImports=false
 from __future__ import annotations
 
 import argparse

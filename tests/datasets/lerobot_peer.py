@@ -1,5 +1,6 @@
 """Runs under an interpreter that has lerobot: reads a data set with it, or makes a small checkpoint of ACT for one."""
 
+# pyright: reportMissingImports=false
 from __future__ import annotations
 
 import json
@@ -16,7 +17,7 @@ if what == "read":
     names = [name for name in rows[0] if name.startswith(("observation", "action", "command"))]
     out = {name: np.stack([row[name].numpy() for row in rows]) for name in names}
     out["index"] = np.array([int(row["index"]) for row in rows])
-    np.savez(sys.argv[3], **out)
+    np.savez(sys.argv[3], **out)  # pyright: ignore[reportArgumentType]
     print(json.dumps({"episodes": data.num_episodes, "frames": len(data), "task": rows[0]["task"], "fps": data.fps}))
 else:
     from lerobot.configs.types import FeatureType

@@ -103,7 +103,7 @@ class GolemEnv(gym.Env[dict[str, Any], Array]):
         self.ticks, self.limit, self._use, self._options = round(period / 0.01), limit, use or {}, options or {}
         self.cameras, self.width, self.late = cameras, width, False
         self.action_names = ACTIONS
-        self.action_space = spaces.Box(-1.0, 1.0, (len(ACTIONS),), np.float32)
+        self.action_space: spaces.Space[Any] = spaces.Box(-1.0, 1.0, (len(ACTIONS),), np.float32)
         each: dict[str, spaces.Space[Any]] = {
             name: spaces.Box(-bound, bound, (part.stop - part.start,), np.float32)
             for name, (part, bound) in PARTS.items()
@@ -242,7 +242,8 @@ class _Errand:
                 hand.close(FORCE) if gap < shut else hand.open(gap)
         heights = context.legs.status.heights if context.legs.reporting else None
         height = None if heights is None else float(np.clip(heights[1] + DROP * action[17], heights[0], heights[2]))
-        context.legs.drive(Twist(*(BASE * action[14:17]).tolist(), height))
+        vx, vy, wz = (BASE * action[14:17]).tolist()
+        context.legs.drive(Twist(vx, vy, wz, height))
 
 
 def register() -> None:

@@ -89,5 +89,5 @@ class PolicySkill:
             if abs(gap - self._gaps[k]) > 1e-3 or (gap < SHUT) != (self._gaps[k] < SHUT):
                 self._gaps[k] = gap
                 hand.close(FORCE) if gap < SHUT else hand.open(gap)
-        height = float(action[HEIGHT])
-        context.legs.drive(Twist(*action[TWIST].tolist(), height if height > 0.0 else None))
+        height, (vx, vy, wz) = float(action[HEIGHT]), action[TWIST].tolist()
+        context.legs.drive(Twist(vx, vy, wz, height if height > 0.0 else None))

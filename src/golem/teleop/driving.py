@@ -99,7 +99,8 @@ class Driving:
         if heights is not None and wish.lift:
             before = heights[1] if self._height is None else self._height
             self._height = float(np.clip(before + wish.lift * context.period, heights[0], heights[2]))
-        context.legs.drive(Twist(*wish.twist.tolist(), self._height))
+        vx, vy, wz = wish.twist.tolist()
+        context.legs.drive(Twist(vx, vy, wz, self._height))
 
     def _palm(self, context: Context, side: Side, wish: Wish) -> None:
         arm, T, dt, goal = context.arms[side], context.T_odom_base, context.period, self.goals[side]
