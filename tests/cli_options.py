@@ -18,6 +18,10 @@ READERS: dict[str, tuple[tuple[str, str], ...]] = {
     "ladder": (("golem.evaluation.harness.ladder", "LadderConfig"),),
     "faults": (("golem.evaluation.harness.ladder", "LadderConfig"), ("golem.evaluation.rungs.faults", "FaultOptions")),
     "skill": (("golem.runtime.live.skill_client", "SkillClientConfig"),),
+    "blame": (
+        ("golem.evaluation.harness.ladder", "LadderConfig"),
+        ("golem.evaluation.blame.blame_command", "BlameConfig"),
+    ),
 }
 """What the commands read that leave parsing to a function of their own: module and dataclass."""
 SECOND: dict[str, Names] = {
@@ -122,11 +126,17 @@ def rung_options(rung: str) -> Names:
 def trained(what: str) -> Names:
     """Return the parameters of every function of a trainer, and the fields of the dataclasses that these take."""
     owner = cli.TRAINERS[what]
-    code = [owner, *{place for place, _ in imports(owner).values() if place.startswith("golem.training")}]
+    return parameters(owner, *{place for place, _ in imports(owner).values() if place.startswith("golem.training")})
+
+
+def parameters(*places: str) -> Names:
+    """Return the parameters of the functions of modules, and the fields of the dataclasses that these take."""
     names: set[str] = set()
-    for place in code:
+    for place in places:
         for node in (module(place) or ast.Module([], [])).body:
-            if isinstance(node, ast.FunctionDef):
+            if isinstance(node, ast.ClassDef):
+                names |= fields(place, node.name)
+            elif isinstance(node, ast.FunctionDef):
                 for argument in [*node.args.args, *node.args.kwonlyargs]:
                     names.add(argument.arg)
                     for each in mentioned(place, argument.annotation or node):
@@ -157,6 +167,8 @@ def options(command: str, second: str = "", rung: str = "") -> Names:
     """
     function = cli.COMMANDS[command]
     names: set[str] = {"help"}
+    if command == "dataset" or second == "--lerobot":
+        return parameters("golem.datasets.commands") | names | {"lerobot"}
     if second in SECOND.get(command, ()):
         if command == "train":
             return trained(second) | names
@@ -168,6 +180,6 @@ def options(command: str, second: str = "", rung: str = "") -> Names:
     kinds += [(inner["module"], inner["names"].partition(":")[0])] if "names" in inner else parsed(function)
     for owner, name in kinds:
         names |= fields(owner, name)
-    if command == "ladder":
+    if command in ("ladder", "blame"):
         names |= rung_options(rung or "tether")
     return frozenset(names | (goals() if command in ("run", "skill") else frozenset()))
