@@ -122,6 +122,21 @@ def test_pause_lets_time_stand_still(twin: tuple[LockstepRunner, Any], view: Liv
     assert time.perf_counter() - begin >= 0.3 + 0.1 - 0.05
 
 
+def test_what_an_agent_asks_for_is_shown_and_answered_by_two_buttons(
+    twin: tuple[LockstepRunner, Any], view: LiveView
+) -> None:
+    said: list[bool] = []
+    view.decide = said.append
+    view.panel.ask("[3] walk <b>x</b>")
+    assert view.panel._question.visible and "&lt;b&gt;" in view.panel._question.content
+    view.panel.press(Button.ALLOW)
+    view.panel.press(Button.DENY)
+    view.idle(lambda: len(said) == 2)
+    assert said == [True, False]
+    view.panel.ask(None)
+    assert not view.panel._question.visible and not any(handle.visible for handle in view.panel._answers)
+
+
 def test_a_skill_can_be_started_only_when_none_runs(twin: tuple[LockstepRunner, Any], view: LiveView) -> None:
     running, _ = twin
     until_state(view, running, GateState.ACTIVE)
