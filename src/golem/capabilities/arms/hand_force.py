@@ -59,6 +59,8 @@ class HandForce:
 
 QUICK, SLOW = 0.012, 0.6
 """Time constants of what is felt now, and of what was there before [s] [own: one tick is off by 2 to 3 N]."""
+HELD = 6.0
+"""Time constant with which what stays becomes what was there before: a load, or the stiffness after a start [s] [own]."""
 TOUCH, LEFT = 2.2, 1.2
 """Change of the force from which on something touches a hand, and below which nothing does any more [N]."""
 MOTION = 12.0
@@ -78,7 +80,7 @@ class ContactSense:
         self._side: Side = side
         self._feel = HandForce()
         self._quick: Array | None = None
-        self._slow, self._t = np.zeros(6), 0.0
+        self._slow, self._speed, self._t = np.zeros(6), np.zeros(7), 0.0
         self.touching, self.change = False, np.zeros(6)
 
     def step(self, t: float, q: Array, dq: Array, tau: Array) -> bool:
@@ -86,13 +88,14 @@ class ContactSense:
         wrench, dt = self._feel.wrench(self._side, q, tau), t - self._t
         self._t = t
         if self._quick is None or not 0.0 < dt < SLOW:
-            self._quick, self._slow = wrench, wrench
+            self._quick, self._slow, self._speed = wrench, wrench, np.zeros(7)
             return False
         self._quick = self._quick + min(1.0, dt / QUICK) * (wrench - self._quick)
         self.change = self._quick - self._slow
         force, before = float(np.linalg.norm(self.change[:3])), self.touching
-        margin = MOTION * float(np.abs(dq[ARM_COLUMNS[self._side]]).max())
+        self._speed = self._speed + min(1.0, dt / QUICK) * (dq[ARM_COLUMNS[self._side]] - self._speed)
+        margin = MOTION * float(np.abs(self._speed).max())
         self.touching = force > (LEFT if before else TOUCH) + margin
-        if not self.touching:
-            self._slow = self._slow + min(1.0, dt / SLOW) * (self._quick - self._slow)
+        constant = HELD if self.touching else SLOW
+        self._slow = self._slow + min(1.0, dt / constant) * (self._quick - self._slow)
         return self.touching != before
