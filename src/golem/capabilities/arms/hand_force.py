@@ -60,7 +60,7 @@ class HandForce:
 QUICK, SLOW = 0.012, 0.6
 """Time constants of what is felt now, and of what was there before [s] [own: one tick is off by 2 to 3 N]."""
 HELD = 6.0
-"""Time constant with which what stays becomes what was there before: a load, or the stiffness after a start [s] [own]."""
+"""Time constant with which what stays becomes what was there before: a load, or stiffness after a start [s] [own]."""
 TOUCH, LEFT = 2.2, 1.2
 """Change of the force from which on something touches a hand, and below which nothing does any more [N]."""
 MOTION = 12.0
