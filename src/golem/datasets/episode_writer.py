@@ -93,7 +93,8 @@ class DatasetWriter:
             OutputError: another process writes it, or the place cannot be written.
             MissingExtra: the extra `data` is not installed.
         """
-        extra("pyarrow.parquet"), extra("av")
+        for package in ("pyarrow.parquet", "av"):
+            extra(package)
         self.root, self._features, self._fps, self.episodes, self.length = root, recipe.features(), recipe.fps, 0, 0
         self._about = {
             "origin": origin,

@@ -61,7 +61,7 @@ class _Over(BaseException):
     """The environment was reset or closed while its trial waited."""
 
 
-class GolemEnv(gym.Env[dict[str, Any], Array]):
+class GolemEnv(gym.Env[dict[str, Any], Any]):
     """One rung; see `golem.evaluation.base.Rung`."""
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": []}

@@ -89,5 +89,5 @@ class PolicySkill:
             if abs(gap - self._gaps[k]) > 1e-3 or (gap < SHUT) != (self._gaps[k] < SHUT):
                 self._gaps[k] = gap
                 hand.close(FORCE) if gap < SHUT else hand.open(gap)
-        height, (vx, vy, wz) = float(action[HEIGHT]), action[TWIST].tolist()
+        (vx, vy, wz), height = action[TWIST].tolist(), float(action[HEIGHT])
         context.legs.drive(Twist(vx, vy, wz, height if height > 0.0 else None))
