@@ -33,7 +33,8 @@ def module_table(reports: list[dict[str, Any]]) -> str:
         lacks = report.get("lacks")
         row = (kept, ", ".join(failed) or "none", rest) if lacks is None else ("-", lacks, "-")
         rows.append(f"| `{report['slot']}` | `{report['use']}` | {row[0]} | {row[1]} | {row[2]} |")
-    rows += [f"| `{slot}` | `{use}` | - | not checked: {why} | - |" for (slot, use), why in UNCHECKED.items()]
+    left_out = [(slot, use, why) for slot, each in UNCHECKED.items() for use, why in each.items()]
+    rows += [f"| `{slot}` | `{use}` | - | not checked: {why} | - |" for slot, use, why in left_out]
     return "\n".join(rows)
 
 

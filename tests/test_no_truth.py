@@ -34,6 +34,8 @@ INSIDERS = (
     "robots/physx",
     "robots/worlds",
     "evaluation",
+    "datasets/commands.py",
+    "datasets/gym_env.py",
     "training",
     "dashboard",
     "cli.py",

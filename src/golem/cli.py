@@ -11,7 +11,6 @@ import shutil
 import sys
 import warnings
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import tyro
@@ -81,14 +80,9 @@ def _ladder(words: list[str]) -> int:
 def _blame(words: list[str]) -> int:
     """Say which modules lost the trials of a ladder run: they are run again with modules exchanged for truth."""
     _prepare_graphics()
-    from golem.evaluation.blame.blame_command import BlameConfig, run_blame
+    from golem.evaluation.blame.blame_command import BlameConfig, after_ladder, run_blame
 
-    if any(word.partition("=")[0] == "--rung" for word in words):
-        from golem.evaluation.harness.ladder import read_ladder, run_ladder
-
-        ran = run_ladder(read_ladder(words)).config
-        words = [str(ran.out), "-j", str(ran.j), "--executor", ran.executor, "--limit", str(ran.limit)]
-    return _exit_code(run_blame(_parse(BlameConfig, "blame", words)))
+    return _exit_code(run_blame(_parse(BlameConfig, "blame", after_ladder(words))))
 
 
 def _faults(words: list[str]) -> int:
@@ -233,23 +227,15 @@ def _check(words: list[str]) -> int:
 
 def _doctor(words: list[str]) -> int:
     """Report what this machine lacks to run GOLEM, and the line that installs it."""
-    if _parse(_DoctorOptions, "doctor", words).compile:
+    from golem.doctor import DoctorOptions, run
+
+    if _parse(DoctorOptions, "doctor", words).compile:
         _prepare_graphics()
         from golem.evaluation.speed.compile_ahead import compile_if_cold
 
         print(f"Every kernel is compiled and on disk: {compile_if_cold() or 0.0:.1f} s of CPU.")
         return 0
-    from golem.doctor import run
-
     return run()
-
-
-@dataclass(frozen=True)
-class _DoctorOptions:
-    """Report what this machine lacks to run GOLEM, and the line that installs it."""
-
-    compile: bool = False
-    """Instead, compile what the first runs would have to."""
 
 
 def _command(doc: str, module: str, names: str, graphics: bool = False) -> Callable[[list[str]], int]:

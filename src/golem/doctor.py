@@ -58,6 +58,14 @@ with mujoco.Renderer(model, 8, 8) as renderer:
 """
 
 
+@dataclass(frozen=True)
+class DoctorOptions:
+    """Report what this machine lacks to run GOLEM, and the line that installs it."""
+
+    compile: bool = False
+    """Instead, compile what the first runs would have to."""
+
+
 @dataclass(frozen=True, slots=True)
 class Diagnosis:
     """One row of the table.

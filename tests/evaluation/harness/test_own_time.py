@@ -51,9 +51,8 @@ def test_who_starves_takes_what_it_gets(started: list[subprocess.Popen[bytes]]) 
     """Six that compute share one CPU."""
     cpu = next(iter(os.sched_getaffinity(0)))
     for _ in range(6):
-        started.append(
-            subprocess.Popen([sys.executable, "-c", f"import os; os.sched_setaffinity(0, {{{cpu}}}); os.nice(5)\n{BUSY}"])
-        )
+        alone = f"import os; os.sched_setaffinity(0, {{{cpu}}}); os.nice(5)"
+        started.append(subprocess.Popen([sys.executable, "-c", f"{alone}\n{BUSY}"]))
     time.sleep(0.5)
     clock, begun = OwnTime(started[0].pid), time.monotonic()
     time.sleep(1.5)

@@ -31,7 +31,7 @@ from golem.runtime.live.role_endpoints import RoleEndpoints
 from golem.runtime.lockstep import build
 from golem.runtime.node_groups import RobotNodes
 from golem.stack import load_stack
-from golem.types import TICK
+from golem.types import SIDES, TICK
 
 
 @dataclass(frozen=True)
@@ -185,5 +185,7 @@ def test_a_message_that_is_no_value_is_refused_by_name(row: TopicRow) -> None:
 def test_every_row_of_a_stream_can_be_sent() -> None:
     """Or its process says how: it is the few whose message takes more than the value."""
     special = {row.name for row in public.TOPICS if row.key is not None and row.encode is None}
-    assert special == {"/lowcmd", "/joint_states", "/tf", "/odom", "/safety/lowcmd_in", "/wrench/left", "/wrench/right"}
+    hands = {f"/{what}/{side}" for what in ("wrench", "contact") for side in SIDES}
+    asked = {"/arm_sdk", "/wirelesscontroller"}
+    assert special == {"/lowcmd", "/joint_states", "/tf", "/odom", "/safety/lowcmd_in"} | hands | asked
     assert all(row.rate for row in public.TOPICS if row.thinned)

@@ -389,7 +389,8 @@ def test_the_skills_and_their_goals_are_on_a_latched_topic(mine: Callable[[str],
     specs = read_list(message)
     assert list(specs) == [*registry.names("skill"), "count", "asleep"]
     assert specs["count"].summary == "Count, and do what no skill should"
-    assert specs["count"].goal["properties"]["to"] == {"type": "integer", "description": "the last number."}
+    last = {"type": "integer", "description": "the last number.", "maximum": 1000}
+    assert specs["count"].goal["properties"]["to"] == last
     assert specs["walk"].goal == schema_of(WalkGoal)
 
 

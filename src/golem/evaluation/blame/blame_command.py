@@ -17,7 +17,7 @@ from golem.errors import ConfigError, unknown_name
 from golem.evaluation.base import RUNGS, rung_class
 from golem.evaluation.blame.game import EXACT, Coalition, Points, Strata, coalitions, orders_of, points, shapley
 from golem.evaluation.blame.oracles import ORACLES, NotHere
-from golem.evaluation.harness.ladder import LadderConfig, prepare
+from golem.evaluation.harness.ladder import LadderConfig, prepare, read_ladder, run_ladder
 from golem.evaluation.harness.records import Provenance, TrialRecord, read_records
 from golem.evaluation.harness.run_folder import RunFolder
 from golem.evaluation.harness.trial_executor import TrialExecutor, make_executor
@@ -227,6 +227,14 @@ def judge(trials: Trials, method: str, names: Sequence[str], config: BlameConfig
     pairs = {name_of(who): effect(who) for who in chosen if len(who) == 2}
     total = effect(frozenset(matter))
     return BlameVerdict(rung, method, strata, singles, pairs, len(wins(everything)), shares, total)
+
+
+def after_ladder(words: list[str]) -> list[str]:
+    """Run the ladder that `words` name by `--rung`, if they do; return the words of the blame of its run."""
+    if not any(word.partition("=")[0] == "--rung" for word in words):
+        return words
+    ran = run_ladder(read_ladder(words)).config
+    return [str(ran.out), "-j", str(ran.j), "--executor", ran.executor, "--limit", str(ran.limit)]
 
 
 def run_blame(config: BlameConfig) -> int:
