@@ -30,7 +30,7 @@ from golem.middleware.ros.msgs.std_srvs import Trigger_Request
 from golem.middleware.ros.node import RosNode
 from golem.runtime.live.skill_messages import read_list
 from golem.runtime.live.stack_process import LET_GO
-from golem.skills.spec import schema_of
+from golem.skills.spec import schema_of, with_ranges
 from golem.skills.walk import WalkGoal
 from golem.stack import Choice
 from golem.types import TICK, Twist
@@ -391,7 +391,7 @@ def test_the_skills_and_their_goals_are_on_a_latched_topic(mine: Callable[[str],
     assert specs["count"].summary == "Count, and do what no skill should"
     last = {"type": "integer", "description": "the last number.", "maximum": 1000}
     assert specs["count"].goal["properties"]["to"] == last
-    assert specs["walk"].goal == schema_of(WalkGoal)
+    assert specs["walk"].goal == with_ranges(WalkGoal, schema_of(WalkGoal))
 
 
 @pytest.mark.parametrize(
