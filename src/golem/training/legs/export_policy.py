@@ -160,7 +160,7 @@ def _description(network: str, config: EnvConfig) -> str:
     data = {
         "network": network,
         "rate": 1.0 / PERIOD,
-        "envelope": {axis: list(bounds) for axis, bounds in asdict(DECLARED).items()},
+        "envelope": {axis: list(bounds) for axis, bounds in asdict(DECLARED).items() if bounds},
         "gait": asdict(config.gait),
         "posture": STANCE[:6].tolist(),
         "kp": KP[:6].tolist(),
