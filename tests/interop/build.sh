@@ -43,7 +43,7 @@ if [ "$sum" != "$(cat "$prefix/.interfaces" 2> /dev/null)" ]; then
     grep -rl --include='*.cmake' "$built" "$prefix/share" "$prefix/lib" |
         xargs sed -i -e "s#$built/lib/python3.12/site-packages#$prefix/lib/python3.12/site-packages#g" -e "s#$built#$home#g"
     packages=$prefix/interfaces
-    for package in golem_interfaces livox_ros_driver2 nav2_msgs unitree_api unitree_hg; do
+    for package in golem_interfaces livox_ros_driver2 nav2_msgs unitree_api unitree_go unitree_hg; do
         mkdir -p "$packages"
         cp -rL "$root/ros/$package" "$packages/$package"
     done

@@ -218,6 +218,8 @@ def test_every_field_of_every_goal_in_json_at_its_edges(crowd: Crowd) -> None:
         "fetch": {"text": "can"},
         "take": {"label": "can"},
         "place": {"x": 0.5, "y": 0.0},
+        "policy": {"seconds": 0.02},
+        "search": {"text": "can", "places": 0},
     }
     for spec in SPECS.values():
         for field in spec.goal["properties"]:
