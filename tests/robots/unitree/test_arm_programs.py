@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.robots.unitree.conftest import Started
-from tests.runtime.live.test_processes import Launched
+from tests.runtime.live.test_processes import Launched, active
 
 from golem.middleware.dds.base import Qos
 from golem.middleware.wire import convert, hg
@@ -29,14 +29,8 @@ def standing(tmp_path: Path, domain: int) -> Iterator[Launched]:
     pytest.importorskip("cyclonedds")
     stack = tmp_path / "stack.yaml"
     stack.write_text("robot: {use: mujoco, world: open, support: ground}\nlower_body: {use: almi}\nprofile: ideal\n")
-    launched = Launched(stack, domain)
-    try:
-        launched.wait_for(r"^\[safety\] Safety gate: active")
+    with active(stack, domain) as launched:
         yield launched
-    finally:
-        if launched.process.poll() is None:
-            launched.process.send_signal(signal.SIGINT)
-            launched.process.wait(60)
 
 
 def watched(domain: int, program: subprocess.Popen[str], after: float = 4.0) -> tuple[Array, Array]:

@@ -9,8 +9,8 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
-from contextlib import closing
+from collections.abc import Generator, Iterator
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 import pytest
@@ -77,12 +77,9 @@ class Launched:
         raise AssertionError(f"nobody called {name} is on the domain")
 
 
-@pytest.fixture
-def launched(tmp_path: Path, domain: int) -> Iterator[Launched]:
-    """A hanging robot that may move."""
-    (tmp_path / "blind.py").write_text(BLIND)
-    stack = tmp_path / "stack.yaml"
-    stack.write_text(STACK.format(blind=tmp_path / "blind.py"))
+@contextmanager
+def active(stack: Path, domain: int) -> Generator[Launched, None, None]:
+    """Launch a stack, and wait until its robot may move."""
     launched = Launched(stack, domain)
     try:
         launched.wait_for(r"^\[safety\] Safety gate: active")
@@ -91,6 +88,16 @@ def launched(tmp_path: Path, domain: int) -> Iterator[Launched]:
         if launched.process.poll() is None:
             launched.process.send_signal(signal.SIGINT)
             launched.process.wait(60)
+
+
+@pytest.fixture
+def launched(tmp_path: Path, domain: int) -> Iterator[Launched]:
+    """A hanging robot that may move."""
+    (tmp_path / "blind.py").write_text(BLIND)
+    stack = tmp_path / "stack.yaml"
+    stack.write_text(STACK.format(blind=tmp_path / "blind.py"))
+    with active(stack, domain) as running:
+        yield running
 
 
 @pytest.mark.parametrize(("victim", "bystander"), [("up", "twin"), ("twin", "up")])

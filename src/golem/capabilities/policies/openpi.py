@@ -75,6 +75,7 @@ class PolicyServer:
         """
         _packages()
         self._config, self._socket = config, None
+        self._where = f"The policy server at {config.host}:{config.port}"
         self.about: dict[str, Any] = {}
 
     def infer(self, observation: Mapping[str, Any]) -> Any:
@@ -84,7 +85,7 @@ class PolicyServer:
             ServiceUnavailable: the server is not there, takes too long, refuses, or answers nonsense.
         """
         websockets, msgpack, _ = _packages()
-        c, where = self._config, f"The policy server at {self._config.host}:{self._config.port}"
+        c, where = self._config, self._where
         try:
             socket = self._socket or self._connect()
             socket.send(msgpack.packb(dict(observation), default=pack_array))
@@ -121,18 +122,17 @@ class PolicyServer:
 
     def _read(self, raw: bytes | str) -> dict[str, Any]:
         _, msgpack, _ = _packages()
-        where = f"The policy server at {self._config.host}:{self._config.port}"
         if isinstance(raw, str):
             self.close()
             raise ServiceUnavailable(
-                f"{where} failed: {shorten(raw.strip().splitlines()[-1] if raw.strip() else raw)}."
+                f"{self._where} failed: {shorten(raw.strip().splitlines()[-1] if raw.strip() else raw)}."
             )
         try:
             value = msgpack.unpackb(raw, object_hook=unpack_array, strict_map_key=False)
         except Exception as error:  # msgpack's errors have no common base
-            raise ServiceUnavailable(f"{where} sent {len(raw)} bytes that are no msgpack.") from error
+            raise ServiceUnavailable(f"{self._where} sent {len(raw)} bytes that are no msgpack.") from error
         if not isinstance(value, dict):
-            raise ServiceUnavailable(f"{where} sent a {type(value).__name__}, not a map.")
+            raise ServiceUnavailable(f"{self._where} sent a {type(value).__name__}, not a map.")
         return value
 
 

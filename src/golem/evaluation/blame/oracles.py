@@ -62,8 +62,7 @@ def with_modules(stack: Stack, overrides: Mapping[str, str]) -> Stack:
     if others.get("localizer") == "truth":
         del others["localizer"]
         oracles = f"{oracles}+detections".strip("+")
-    for slot, use in others.items():
-        stack = stack.with_choice(slot, use)
+    stack = stack.with_choices(others)
     for name in oracles.split("+") if oracles else ():
         if name not in ORACLES:
             raise unknown_name("oracle", name, ORACLES)
