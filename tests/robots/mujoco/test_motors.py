@@ -104,3 +104,22 @@ def test_joints_get_their_own_friction_and_keep_the_models_where_none_is_told() 
     Motors(model, np.full(NUM_JOINTS, 100.0), ZERO, 0.0).resist(model, friction)
     np.testing.assert_array_equal(model.dof_frictionloss[6:][1::2], 1.5)
     np.testing.assert_array_equal(model.dof_frictionloss[6:][::2], before[::2])
+
+
+def test_a_torque_that_turns_crosses_the_backlash_before_the_link_feels_it() -> None:
+    model = robot_spec(hands=False).compile()
+    data, inertia, play = mujoco.MjData(model), float(model.dof_armature[6]), 0.004
+    motors = Motors(model, np.full(NUM_JOINTS, 100.0), ZERO, 0.0, backlash=play)
+    felt, seen, end = [], [], 0.06
+    for value in (1.0, -1.0):
+        motors.give(torque(value), data.time)
+        for _ in range(round(end / 0.0005)):
+            motors.drive(data)
+            felt.append(float(data.ctrl[0]))
+            seen.append(float(motors.measure(data)[0][0]))
+            data.time += 0.0005
+    pushed = np.array(felt[len(felt) // 2 :])
+    crossing = np.sqrt(2.0 * play * inertia)
+    assert (pushed[: round(0.9 * crossing / 0.0005)] == 0.0).all()
+    assert (pushed[round(1.1 * crossing / 0.0005) :] == -1.0).all()
+    assert seen[len(seen) // 2 - 1] - seen[-1] == pytest.approx(play)  # the encoder is the motor's

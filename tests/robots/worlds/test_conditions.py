@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from golem.errors import ConfigError
+from golem.robots.model.magpie_model import hand_name
 from golem.robots.mujoco.config import MujocoConfig
 from golem.robots.mujoco.scene import build_scene
 from golem.robots.sensors.auto_exposure import GAIN, LONGER, READ_NOISE, SHOT_NOISE, AutoExposure
@@ -22,7 +23,10 @@ from golem.robots.worlds.conditions import (
     draw_conditions,
     draw_fasteners,
 )
+from golem.robots.worlds.ioniq5 import Ioniq5Layout
 from golem.robots.worlds.layout import PackLayout
+from golem.robots.worlds.screws import draw_screws
+from golem.types import SIDES
 
 
 def rng(seed: int = 0) -> np.random.Generator:
@@ -130,3 +134,33 @@ def test_a_tray_on_the_other_side_is_the_mirror_image() -> None:
     moved = arranged(PackLayout(), Conditions(tray_side="left", tray_y=0.02))
     x, y = PackLayout().tray_xy
     np.testing.assert_allclose(moved.tray_xy, (x, -y + 0.02), atol=1e-12)
+
+
+def test_a_pack_of_another_pitch_is_as_much_longer_and_a_real_one_is_not() -> None:
+    pack = arranged(PackLayout(), Conditions(pitch=1.2, tray_wall=0.06))
+    steps = [np.diff(layout.fasteners()[1:5, 1]).mean() for layout in (PackLayout(), pack)]
+    assert steps[1] == pytest.approx(1.2 * steps[0], rel=0.01)
+    assert pack.tray_size == (0.18, 0.24, 0.06)
+    assert arranged(Ioniq5Layout(), Conditions(pitch=1.2)).size_y == Ioniq5Layout().size_y
+
+
+def test_heads_of_a_varied_place_leave_no_gap_between_tight_and_loose() -> None:
+    field = load_profile("field")
+    scene = build_scene(MujocoConfig(layout="varied"), PackLayout(), field, 2)
+    tight = [float(p.size[2]) for p in scene.names.parts if p.label == "screw" and p.body == "pack"]
+    draws = draw_screws(rng(), field.screws.lower(), range(500))
+    loose = [d.protrusion + d.head_height for d in draws]
+    assert 0.005 <= min(tight) < 0.006 < 0.0075 < max(tight) <= 0.0086
+    assert 0.008 < min(loose) < 0.0086
+    assert np.diff(np.sort(tight + loose)).max() < 0.0007
+
+
+def test_hands_are_mounted_beside_where_the_robot_believes_them() -> None:
+    def mounts(**conditions: float) -> np.ndarray:
+        config = MujocoConfig(conditions=dict(conditions))
+        model = build_scene(config, PackLayout(), load_profile("ideal"), 3).model
+        return np.array([model.body(hand_name(side)).pos for side in SIDES])
+
+    moved = mounts(hand_offset=0.01) - mounts()
+    np.testing.assert_allclose(np.linalg.norm(moved, axis=1), 0.01)
+    assert not np.allclose(moved[0], moved[1], atol=1e-4)

@@ -77,6 +77,8 @@ class MujocoRobot:
         model = self.scene.model
         self.data = mujoco.MjData(model)
         self._model = model
+        conditions = self.scene.conditions
+        self.profile = self.profile.under(conditions)
         self._errors = sample_episode(self.profile, stream(seed, "episode"))
         # The cameras are where the model has them; it is the calibration that is wrong.
         self.calibration: dict[str, Array] = {
@@ -85,7 +87,6 @@ class MujocoRobot:
         self._depth = {
             name: StereoDepth(info, self.profile.depth, stream(seed, f"depth/{name}")) for name, info in CAMERAS.items()
         }
-        conditions = self.scene.conditions
         self._exposure = {
             name: AutoExposure(conditions.light, stream(seed, f"exposure/{name}"), self.profile.colour_noise)
             for name in CAMERAS
@@ -104,6 +105,7 @@ class MujocoRobot:
             memory["motors"],
             self.profile.motors,
             stream(seed, "motors"),
+            self.profile.backlash,
         )
         self._motors.resist(model, self._errors.friction)
         self._rig: CameraRig | None = None

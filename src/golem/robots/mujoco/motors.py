@@ -14,8 +14,12 @@ from golem.native_messages import put_command
 from golem.robots.sensors.profiles import MotorErrors, per_joint
 from golem.types import NUM_JOINTS, TICK, Array, LowCommand
 
+LEAST_ROTOR = 0.005
+"""Inertia of a rotor that a model says nothing of, at the joint [kg m2]."""
 SLOTS = 128
 """Commands that are on their way at most."""
+LONGEST = 0.002
+"""Physics step at most [s]; what is over it was no step, but a moment restored."""
 _SLACK = 1e-4
 """Below the shortest physics step [s]: sums of time steps are not exact."""
 
@@ -38,6 +42,10 @@ MOTORS = np.dtype(
         ("encoder_step", "f8"),
         ("noise", "f8", (2,)),
         ("torque_gain", "f8", (NUM_JOINTS,)),
+        ("play", "f8"),
+        ("rotor", "f8", (NUM_JOINTS,)),
+        ("ahead", "f8", (2, NUM_JOINTS)),
+        ("driven", "f8"),
         ("random", "u8"),
     ]
 )
@@ -45,7 +53,9 @@ MOTORS = np.dtype(
 
 Waiting commands are a ring: the k-th one given is in slot k modulo `SLOTS`, rows `constant`, `kp`, `kd`. `constant` is
 what the motors add to -kp q - kd dq; q is the true position, the encoders' error is in the target. `noise` is that of
-speed and torque, `random` the state of their generator; see `MotorErrors`.
+speed and torque, `random` the state of their generator; see `MotorErrors`. `ahead` is how far a rotor is ahead of its
+link, and how fast; `rotor` its inertia and `play` half of the backlash, all at the joint; `driven` is when the last
+step began.
 """
 _motors_at = view(MOTORS)
 
@@ -56,10 +66,10 @@ def report(m: Record, qpos: int, qvel: int, q: Array, dq: Array, tau: Array) -> 
     place, speed, step, state = floats(qpos), floats(qvel), m.encoder_step, m.random
     noisy = m.noise[0] + m.noise[1] > 0.0
     for i in range(NUM_JOINTS):
-        q[i] = place[m.q[i]] + m.offset[i]
+        q[i] = place[m.q[i]] + m.ahead[0, i] + m.offset[i]
         if step > 0.0:
             q[i] = step * round(q[i] / step)
-        dq[i], tau[i] = speed[m.v[i]], m.torque_gain[i] * m.tau[i]
+        dq[i], tau[i] = speed[m.v[i]] + m.ahead[1, i], m.torque_gain[i] * m.tau[i]
         if noisy:  # two normal numbers by Box and Muller, of two uniform ones by xorshift64*
             state = _shifted(state)
             radius = math.sqrt(-2.0 * math.log(_unit(state)))
@@ -122,10 +132,28 @@ def drive(m: Record, time: float, qpos: int, qvel: int, ctrl: int) -> None:
     if not m.latched:
         return
     q, v, out = floats(qpos), floats(qvel), floats(ctrl)
+    dt = min(max(time - m.driven, 0.0), LONGEST)
+    m.driven = time
     for i in range(NUM_JOINTS):
-        tau = m.constant[i] - m.kp[i] * q[m.q[i]] - m.kd[i] * v[m.v[i]]
+        tau = m.constant[i] - m.kp[i] * (q[m.q[i]] + m.ahead[0, i]) - m.kd[i] * (v[m.v[i]] + m.ahead[1, i])
         m.tau[i] = min(max(tau, -m.limit[i]), m.limit[i])
-        out[i] = m.tau[i]
+        out[i] = m.tau[i] if m.play == 0.0 or _pushes(m, i, dt) else 0.0
+
+
+@njit(cache=True, nogil=True)
+def _pushes(m: Record, i: int, dt: float) -> bool:
+    """Move the rotor of joint `i` in its play for `dt` [s]; return whether its torque reaches the link.
+
+    It does while the rotor is at that end of the play to which its torque drives it (dead zone with inertia: Nordin and
+    Gutman, Controlling mechanical systems with backlash: a survey, Automatica 38, 2002). Left out: the acceleration of
+    the link in the play, and what the rotor's impact hands over.
+    """
+    speed = m.ahead[1, i] + m.tau[i] / m.rotor[i] * dt
+    place = m.ahead[0, i] + speed * dt
+    touches = abs(place) >= m.play
+    m.ahead[0, i] = min(max(place, -m.play), m.play)
+    m.ahead[1, i] = 0.0 if touches else speed
+    return touches
 
 
 class Motors:
@@ -145,6 +173,7 @@ class Motors:
         memory: Records | None = None,
         errors: MotorErrors | None = None,
         rng: np.random.Generator | None = None,
+        backlash: float = 0.0,
     ) -> None:
         """Attach to `model`.
 
@@ -156,6 +185,7 @@ class Motors:
             memory: where they remember, a `MOTORS`; None is a place of their own.
             errors: of what they report; None reports what is.
             rng: draws those.
+            backlash: play of the gears between rotor, whose encoder reports, and link [rad].
 
         Raises:
             ConfigError: the delay is longer than commands are kept.
@@ -173,6 +203,7 @@ class Motors:
         gains = per_joint(errors.torque_gains)
         memory["torque_gain"] = 1.0 + gains + errors.torque_gain * rng.standard_normal(NUM_JOINTS)
         memory["random"] = rng.integers(1, 2**63)
+        memory["play"], memory["rotor"] = 0.5 * backlash, np.maximum(model.dof_armature[self._v], LEAST_ROTOR)
         self._numbers = np.empty(COMMAND)
         self.tau: Array = memory["tau"][0]
 

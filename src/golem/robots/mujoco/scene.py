@@ -150,9 +150,13 @@ def _build(spec: mujoco.MjSpec, config: MujocoConfig, layout: PackLayout, profil
         reach_y = config.reach_y if config.layout == "nominal" else REACH_Y
         places = draw_fasteners(layout, conditions, reach_y, stream(seed, "world/fasteners"))
         layout = replace(layout, empty_holes=(*layout.empty_holes, *places.missing))
-        draws = draw_screws(stream(seed, "world/screws"), profile.screws, places.loose, layout.kind)
+        varied = config.layout == "varied"
+        ranges = profile.screws.lower() if varied else profile.screws
+        draws = draw_screws(stream(seed, "world/screws"), ranges, places.loose, layout.kind)
         layout = layout.seen_with(stance)
-        names = add_pack(spec, layout, draws, stance=stance, workshop=config.world in WORKSHOPS)
+        tight = stream(seed, "world/tight") if varied else None
+        names = add_pack(spec, layout, draws, stance=stance, workshop=config.world in WORKSHOPS, tight=tight)
+        _displace_hands(spec, conditions.hand_offset, stream(seed, "world/hands"))
         add_clutter(spec, layout, round(conditions.clutter), stream(seed, "world/clutter"))
         dress(spec, conditions, stance)
         if config.gantry:
@@ -281,6 +285,13 @@ def _add_payload(hand: mujoco.MjsBody, mass: float) -> None:
         inertia=np.diag(held.inertia),
         explicitinertial=True,
     )
+
+
+def _displace_hands(spec: mujoco.MjSpec, by: float, rng: np.random.Generator) -> None:
+    """Mount each hand `by` [m] beside its place, in a direction of its own."""
+    for side in SIDES:
+        hand, way = spec.body(magpie_model.hand_name(side)), rng.standard_normal(3)
+        hand.pos = hand.pos + by * way / np.linalg.norm(way)
 
 
 def _add_gantry(spec: mujoco.MjSpec, layout: PackLayout) -> None:

@@ -15,6 +15,7 @@ from golem.robots.model.table import JOINT_INDEX
 from golem.robots.sensors.cameras import CAMERAS
 from golem.robots.sensors.depth import DepthErrors
 from golem.robots.sensors.imu import ImuBias, ImuErrors
+from golem.robots.worlds.conditions import Conditions
 from golem.robots.worlds.screws import ScrewRanges
 from golem.types import LEGS, NUM_JOINTS, UPPER, Array
 
@@ -127,6 +128,7 @@ class RealismProfile:
         motors: errors of what the motors report.
         leg_friction, arm_friction: range of each joint's dry friction, legs and then torso and arms [N m]; None leaves
             that of the model.
+        backlash: play of each joint's gears, from end to end [rad]; the encoder is on the motor's side.
         imu: errors of the IMU.
         hoist_sway: radial RMS of the base's horizontal sway in the hoist [m]; a robot that stands sways by itself.
         screws: ranges of the loosened screws.
@@ -146,6 +148,7 @@ class RealismProfile:
     motors: MotorErrors = MotorErrors()
     leg_friction: tuple[float, float] | None = None
     arm_friction: tuple[float, float] | None = None
+    backlash: float = 0.0
     imu: ImuErrors = ImuErrors()
     hoist_sway: float = 0.0
     screws: ScrewRanges = field(default_factory=ScrewRanges)
@@ -154,6 +157,13 @@ class RealismProfile:
     def lives(self) -> bool:
         """Whether the last digits of its sensors move while the robot rests: the IMU's noise sees to all of them."""
         return self.imu.gyro_noise > 0.0
+
+    def under(self, c: Conditions) -> RealismProfile:
+        """Return it with the factors `palm`, `arm_friction` and `backlash` of a work place's conditions."""
+        low, high = self.palm.translation
+        palm = replace(self.palm, rotation=c.palm * self.palm.rotation, translation=(c.palm * low, c.palm * high))
+        rubs = self.arm_friction and (c.arm_friction * self.arm_friction[0], c.arm_friction * self.arm_friction[1])
+        return replace(self, palm=palm, arm_friction=rubs, backlash=c.backlash * self.backlash)
 
 
 PROFILES: dict[str, RealismProfile] = {
@@ -165,7 +175,16 @@ D400 = PROFILES["field"].depth
 """What a RealSense's depth gets wrong."""
 MOTORS = PROFILES["field"].motors
 """What a motor's report gets wrong."""
-OF_A_FILE = ("arm_offset", "leg_offset", "zeros", "actuator_delay", "motors", "leg_friction", "arm_friction")
+OF_A_FILE = (
+    "arm_offset",
+    "leg_offset",
+    "zeros",
+    "actuator_delay",
+    "motors",
+    "leg_friction",
+    "arm_friction",
+    "backlash",
+)
 """What a file may say of one robot: what `golem identify` finds."""
 
 

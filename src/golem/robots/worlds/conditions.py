@@ -61,6 +61,11 @@ class Conditions:
         cover: colour of the cover.
         tray: colour of the tray.
         clutter: things that lie on the cover.
+        tray_wall: height of the trays [m].
+        pitch: of the fasteners along the pack's long side, and so its length, as a share of the nominal one; not of a
+            real pack.
+        palm, arm_friction, backlash: of the robot that works there, as shares of what its profile has.
+        hand_offset: distance of each hand's mount from where the robot believes it [m]; the seed draws whither.
     """
 
     pack_x: float = 0.0
@@ -79,6 +84,12 @@ class Conditions:
     cover: Coat = "grey"
     tray: str = "teal"
     clutter: float = 0.0
+    tray_wall: float = 0.045
+    pitch: float = 1.0
+    palm: float = 1.0
+    arm_friction: float = 1.0
+    backlash: float = 1.0
+    hand_offset: float = 0.0
 
 
 RANGES: dict[str, tuple[float, float]] = {name: tuple(row["range"]) for name, row in _DATA["conditions"].items()}
@@ -157,6 +168,8 @@ def arranged(layout: PackLayout, conditions: Conditions) -> PackLayout:
         near_edge=layout.near_edge + c.pack_x,
         center_y=layout.center_y + c.pack_y,
         yaw=c.pack_yaw,
+        tray_size=(*layout.tray_size[:2], c.tray_wall),
+        size_y=layout.size_y * (c.pitch if type(layout) is PackLayout else 1.0),
     )
     if all(getattr(c, name) == getattr(Conditions(), name) for name in PLACES):
         return moved  # to the last bit where it was

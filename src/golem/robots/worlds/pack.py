@@ -65,6 +65,8 @@ def add_tray(spec: mujoco.MjSpec, layout: PackLayout, place: TrayPlace) -> None:
 STUD_PITCH = 0.09
 FASTENER_HEAD = (0.0105, 0.006)
 """Across flats and height of the heads that are still tight [m]."""
+TIGHT = ((0.009, 0.005, 0.0), (0.0125, 0.007, 0.0016))
+"""The same and what lies below, least and most [m]: up to an M6 washer, 1.6 mm (ISO 7089); heads are assumed."""
 
 _CYLINDER = mujoco.mjtGeom.mjGEOM_CYLINDER
 
@@ -99,6 +101,7 @@ def add_pack(
     sleep: bool = True,
     stance: PlanarPose = hall.HERE,
     workshop: bool = True,
+    tight: np.random.Generator | None = None,
 ) -> PackNames:
     """Add pack, stand, tray and loosened screws to `spec`, which may already hold the robot.
 
@@ -109,6 +112,7 @@ def add_pack(
         sleep: let undisturbed screws sleep.
         stance: where the robot should stand before the pack: lamps and workshop are placed by it.
         workshop: add the workshop around it; a world without has materials and floor already.
+        tight: draws head and washer of each tight screw from `TIGHT`; None has all alike, without washers.
 
     Raises:
         ConfigError: two screws share a place, a place does not exist or is an empty hole.
@@ -137,7 +141,7 @@ def add_pack(
         _add_rim(spec, body, layout, loose | dict.fromkeys(layout.empty_holes, 0.003))
     pack_part.add_meshes(spec)
     found = _add_window(body, layout)
-    found += _add_fasteners(spec, body, layout, set(slots))
+    found += _add_fasteners(spec, body, layout, set(slots), tight)
     for draw in draws:
         (pack_part.add_stud if draw.kind == "nut" else screws.add_bore)(body, draw, spots[draw.slot])
     for draw in draws:
@@ -208,7 +212,7 @@ def _add_rim(spec: mujoco.MjSpec, body: mujoco.MjsBody, layout: PackLayout, hole
         add_slab(body, xs, ys)
     for y in np.arange(-0.85, 0.9, 0.17):  # pressed beads
         for xs in ((wx1 + 0.05, x1 - 0.05), (wx0 + 0.04, wx1 - 0.04)):
-            if xs[0] < wx1 and wy0 - 0.08 < y < wy1 + 0.08:
+            if abs(y) > hy - 0.1 or (xs[0] < wx1 and wy0 - 0.08 < y < wy1 + 0.08):
                 continue
             if xs[0] < wx1 and layout.tray_z < layout.top_z + 0.01 and abs(y - layout.tray_xy[1]) < 0.2:
                 continue
@@ -298,9 +302,11 @@ def _add_bus_bar(body: mujoco.MjsBody, pos: tuple[float, float, float], name: st
     return found
 
 
-def _add_fasteners(spec: mujoco.MjSpec, body: mujoco.MjsBody, layout: PackLayout, loose: set[int]) -> list[PackPart]:
+def _add_fasteners(
+    spec: mujoco.MjSpec, body: mujoco.MjsBody, layout: PackLayout, loose: set[int], tight: np.random.Generator | None
+) -> list[PackPart]:
     """Add the tight fasteners and list the empty holes; where they are is in the pack frame."""
-    flats, height = FASTENER_HEAD
+    (flats, height), low = FASTENER_HEAD, 0.0
     head = parts.add_mesh(spec, "fastener_hex", *parts.hexagon(flats, height))
     flange = parts.add_mesh(
         spec, "fastener_flange", *parts.lathe([(0.0072, 0.0), (0.0072, 0.001), (0.0058, 0.0018)], sides=24)
@@ -320,9 +326,14 @@ def _add_fasteners(spec: mujoco.MjSpec, body: mujoco.MjsBody, layout: PackLayout
             found.append(PackPart("screw_hole", "pack", (), at, np.array([0.006, 0.006, 0.0])))
         else:
             names = (f"fastener_{slot:02d}_flange", f"fastener_{slot:02d}_hex")
-            parts.visual_mesh(body, flange, at, material="zinc", name=names[0])
-            parts.visual_mesh(body, head, at, material="zinc", name=names[1])
-            parts.collider(body, _CYLINDER, (0.006, height / 2), (x, y, z + height / 2))
-            size = np.array([0.0144, 0.0144, height])
-            found.append(PackPart("screw", "pack", names, at + [0, 0, height], size))
+            if tight is not None:
+                flats, height, low = tight.uniform(*TIGHT)
+                head = parts.add_mesh(spec, names[1], *parts.hexagon(flats, height))
+                parts.visual(body, _CYLINDER, (0.0072, low / 2), (x, y, z + low / 2), material="steel")
+            top = low + height
+            parts.visual_mesh(body, flange, (x, y, z + low), material="zinc", name=names[0])
+            parts.visual_mesh(body, head, (x, y, z + low), material="zinc", name=names[1])
+            parts.collider(body, _CYLINDER, (0.006 * flats / FASTENER_HEAD[0], top / 2), (x, y, z + top / 2))
+            size = np.array([0.0144, 0.0144, top])
+            found.append(PackPart("screw", "pack", names, at + [0, 0, top], size))
     return found

@@ -50,6 +50,11 @@ class ScrewRanges:
     head_height: tuple[float, float] = (0.005, 0.007)
     mass: tuple[float, float] = (0.015, 0.030)
 
+    def lower(self) -> ScrewRanges:
+        """Return those of a varied work place: from 3 mm on, so that no gap sets loose heads off from tight ones."""
+        low, high = self.protrusion
+        return replace(self, protrusion=(min(low, 0.003) if low < high else low, high))
+
     def of(self, kind: Kind) -> ScrewRanges:
         """Return those of M6 flange nuts, whose shank is the stud above its seat, or of an M8 bolt; assumed."""
         if kind == "nut":
