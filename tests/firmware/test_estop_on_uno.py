@@ -48,7 +48,7 @@ def test_a_contact_that_was_open_for_two_milliseconds_is_in_five_frames(uno: Uno
 @pytest.mark.parametrize(
     "fault", ["weld", "cut 2", "cut 3", "ground 2", "ground 3", "flip 2b 2", "flip 2b 3", "flip 2a 2", "flip 2a 5"]
 )
-@pytest.mark.parametrize("before", [pytest.param(True, marks=pytest.mark.slow), False])
+@pytest.mark.parametrize("before", [pytest.param(True, marks=(pytest.mark.slow, pytest.mark.long)), False])
 def test_no_single_fault_hides_a_press(fault: str, before: bool, uno: Uno) -> None:
     frames(uno, 0.105)
     for word in (fault, "press") if before else ("press", fault):

@@ -94,6 +94,7 @@ def test_records_are_those_of_two_processes_here_though_a_worker_is_killed(
     assert content(there.out) == content(here.out)
 
 
+@pytest.mark.long
 def test_a_trial_that_hangs_or_crashes_there_costs_itself(fake: Make, cluster: Cluster) -> None:
     cluster.add()
     for method, stage in (("endless", "timeout"), ("deadly", "crash")):

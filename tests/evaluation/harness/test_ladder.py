@@ -171,7 +171,9 @@ def test_ctrl_c_keeps_what_finished_and_tells_the_command(fake: Make, monkeypatc
 
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/environ").exists(), reason="no /proc here")
-@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    "how", [signal.SIGKILL, *(pytest.param(how, marks=pytest.mark.long) for how in (signal.SIGINT, signal.SIGTERM))]
+)
 def test_a_killed_run_leaves_no_process_and_continues_to_the_same_bytes(fake: Make, tmp_path: Path, how: int) -> None:
     script, config = tmp_path / "script.py", fake("poor", "slow", n=20, out="killed", j=2)
     script.write_text(SCRIPT)

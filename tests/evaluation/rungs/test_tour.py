@@ -116,7 +116,7 @@ def test_the_curve_falls_where_robots_were_lost() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("engine", ["mujoco", "physx"])
+@pytest.mark.parametrize("engine", ["mujoco", pytest.param("physx", marks=pytest.mark.long)])
 def test_a_short_tour_repeats_bit_for_bit(engine: str, monkeypatch: pytest.MonkeyPatch) -> None:
     if engine == "physx":
         pytest.importorskip("sapien")

@@ -61,6 +61,7 @@ def test_the_pack_stands_where_the_stance_says(world: str) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_a_robot_that_stands_badly_docks_and_picks() -> None:
     found = VarStandRung().run(spec(0, dock="yes"), None)
     assert found.series["dockings"] >= 1 and found.series["approaches"] >= 1

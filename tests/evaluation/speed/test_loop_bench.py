@@ -34,6 +34,7 @@ def test_a_process_that_ends_says_why() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_two_checkouts_are_measured_in_turn(capsys: pytest.CaptureFixture[str]) -> None:
     config = LoopBenchConfig(("stand",), seconds=0.2, repetitions=1, against=SOURCE.parent, json=True)
     found = run_loop_bench(config)

@@ -48,7 +48,7 @@ from golem.runtime.skill_table import SkillTable
 from golem.stack import Stack
 from golem.types import TICK
 
-COUNT = int(os.environ.get("GOLEM_FUZZ_MESSAGES", "3000"))
+COUNT = int(os.environ.get("GOLEM_FUZZ_MESSAGES", "1000"))
 BATCH = 25
 """Random messages between two looks at the answers."""
 FLOATS = (0.0, -1.0, 1e9, 1e308, -1e308, 5e-324, float("nan"), float("inf"), float("-inf"))
