@@ -106,9 +106,6 @@ def _read(of: Schema, value: Any) -> Any:
         return value  # and the goal says what it should be
 
 
-if TYPE_CHECKING:
-    import viser
-
 STAGE_COLOURS = ("#3b7ea1", "#5a9367", "#e0933f", "#c2503a", "#7d5ba6", "#2b9c92", "#8a6d3b")
 SAFETY_COLOURS = {
     GateState.ACTIVE: "#2e9e63",

@@ -28,9 +28,6 @@ from golem.types import Array
 if TYPE_CHECKING:
     import viser
 
-if TYPE_CHECKING:
-    import viser
-
 TARGET_COLOUR = (255, 60, 160)
 PUSH_COLOUR = (232, 78, 60)
 ARROW = 0.003

@@ -18,15 +18,6 @@ from golem.types import Array, PlanarPose, Side, Twist
 if TYPE_CHECKING:
     from golem.skills.context import Context
 
-if TYPE_CHECKING:
-    from golem.skills.context import Context
-
-if TYPE_CHECKING:
-    from golem.skills.context import Context
-
-if TYPE_CHECKING:
-    from golem.skills.context import Context
-
 
 class Navigation:
     """The navigator drives the legs to a goal while this is open (a context manager); then the robot stands."""
