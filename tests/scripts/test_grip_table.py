@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from golem.hardware.hands.magpie import MagpieHand
 from scripts.grip_table import THINGS, GripConfig, pressed, rows
+
+from golem.hardware.hands.magpie import MagpieHand
 
 
 def test_a_hand_presses_with_what_it_was_told() -> None:
