@@ -7,6 +7,7 @@ where a finger ever pressed harder than it bears. What it prints is the table of
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -105,9 +106,10 @@ def rows(config: GripConfig, label: str, thing: Thing) -> list[tuple[str, ...]]:
     rng = np.random.default_rng([config.seed, *label.encode()])
     mass, bears = rng.uniform(*thing.mass, config.n), rng.uniform(*thing.bears, config.n)
     friction = believed.friction * rng.uniform(*FRICTION, config.n)
-    stiffness = believed.stiffness * np.exp(rng.uniform(*np.log(STIFFNESS), config.n))
+    stiffness = believed.stiffness * np.exp(rng.uniform(math.log(STIFFNESS[0]), math.log(STIFFNESS[1]), config.n))
     needed = mass * (GRAVITY + LIFT) / (2.0 * friction)
     tuned = float(np.clip(holding_force(believed, take.safety, take.squeeze), take.touch, take.force))
+    grips: list[tuple[str, type[MagpieHand], float]]
     grips = [("deligrasp, tuned", DeliGrasp, tuned), ("magpie, tuned", MagpieHand, tuned)]
     grips += [(f"magpie, {force:g} N", MagpieHand, force) for force in config.fixed]
     found: list[tuple[str, ...]] = []
