@@ -111,7 +111,6 @@ def run_mcp(config: McpConfig) -> bool:
 
 
 def _use(desk: Desk, config: McpConfig) -> bool:
-    """Do what is asked; return whether it was done."""
     if config.replay is not None:
         rows = list(replay(config.replay, desk.call))
         for tool, then, now in rows:

@@ -148,7 +148,6 @@ def _page(title: str, cls: type[Any], options: Iterator[Option]) -> str:
 
 
 def _defaults(cls: type[Any], default: Any) -> Mapping[str, Any]:
-    """Return the default of each option by name."""
     if default is not None:
         return {f.name: getattr(default, f.name) for f in dataclasses.fields(cls)}
     if not dataclasses.is_dataclass(cls):
@@ -185,7 +184,6 @@ def _sections(doc: str | None) -> dict[str, str]:
 
 
 def _kind(hint: Any) -> str:
-    """Return the type of an option, as a user may read it."""
     origin, inner = typing.get_origin(hint), typing.get_args(hint)
     if origin is typing.Literal:
         return " or ".join(str(value) for value in inner)

@@ -156,7 +156,6 @@ class Unchanged:
     """Sees whether the package's code changes under what runs it: workers import, and load networks, late."""
 
     def __init__(self) -> None:
-        """Begin with the code as it is."""
         self._stamp = self._now()
 
     def check(self, out: Path) -> None:
@@ -199,7 +198,6 @@ def _package_files(folder: Path | str | None = None) -> Iterator[os.DirEntry[str
 
 
 def _git(*arguments: str) -> str | None:
-    """Return what git prints in the package's folder, or None where it fails or is not installed."""
     command = ["git", "-C", str(_package()), *arguments]
     try:
         result = subprocess.run(command, capture_output=True, text=True, check=True, timeout=30)

@@ -131,7 +131,6 @@ def _lacking(cls: type[Any], asked: type[Any]) -> list[str]:
 def _given(
     slot: str, use: str, cls: type[Any], options: Mapping[str, object], supplied: Collection[str]
 ) -> dict[str, Any]:
-    """Return the arguments of a constructor that `options` are, checked."""
     if config_class(cls) is not None:
         return {"config": configure(slot, use, options)}
     return convert_all(_option(slot, use), cls, options, supplied)
@@ -181,7 +180,6 @@ def config_class(cls: type[Any]) -> type[Any] | None:
 
 
 def _option(slot: str, use: str) -> str:
-    """Return what an option of an implementation is to the user."""
     return f"option of {slot}: {use}"
 
 

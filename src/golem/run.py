@@ -200,7 +200,6 @@ def show_trial(config: LadderConfig) -> TrialOutcome:
 
 
 def _show_trace(result: SkillResult) -> None:
-    """Print where a module failed, if one did."""
     if result.trace is not None:
         print(result.trace, file=sys.stderr)
 
@@ -235,7 +234,6 @@ class Narrator:
     """Prints what the running skill says: each new stage, and each sentence that differs in more than its figures."""
 
     def __init__(self, running: LockstepRunner) -> None:
-        """Listen to the skill of `running`."""
         self._news = News(running.bus, topics.FEEDBACK)
         self._said = ""
 

@@ -285,7 +285,6 @@ def parse_stack(text: str, name: str) -> Stack:
 
 
 def _options(name: str, key: str, value: object) -> Mapping[str, Any]:
-    """Return the options of a part, which are checked here and not where they are used."""
     if not isinstance(value, Mapping):
         raise ConfigError(f"{name}: '{key}' wants '{{option: value, ...}}'; golem options {key} lists them.")
     check_values(f"{name}: {key}", value)

@@ -12,9 +12,8 @@ from typing import Any
 import pytest
 from tests.agent.fake_body import HOSTILE, Rig
 
-from golem.agent.mcp_server import http_app, make_server
+from golem.agent.mcp_server import http_app, make_server, tool_specs
 from golem.agent.tool_rules import Rules, ToolRule
-from golem.agent.tools import tool_specs
 from golem.runtime.skill_table import SkillTable
 from golem.stack import Stack
 

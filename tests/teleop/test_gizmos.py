@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from golem.teleop.driving import Driving
-from golem.teleop.gizmos import Gizmos
 from golem.teleop.pilot import HandPilot
+from golem.teleop.session import Gizmos
 
 ORIGIN = np.array([0.0, 0.0, 1.3])
 

@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 
 from golem.errors import ConfigError
-from golem.teleop.page import MOST, PilotPage
 from golem.teleop.pilot import HandPilot
+from golem.teleop.session import MOST, PilotPage
 
 client = pytest.importorskip("websockets.sync.client")
 HOLD = json.dumps({"hold": True, "twist": [1, 0, 0]})

@@ -71,7 +71,6 @@ class DomainBody(Body):
         return self._sent is not None and self.result() is None
 
     def begin(self, skill: str, fields: Mapping[str, Any]) -> None:
-        """Begin a skill; see `Body`."""
         if not until(self._node, self._client.ready, SEARCH):
             raise RosError(f"Nobody offers '{RUN}'; {self._remedy}.")
         self._goal = self._outcome = None
@@ -84,11 +83,9 @@ class DomainBody(Body):
         self._news.append(Feedback(convert.seconds(f.stamp), f.skill, f.stage, f.text))
 
     def said(self) -> Feedback | None:
-        """Return news of the skill; see `Body`."""
         return self._news.popleft() if self._news else None
 
     def result(self) -> SkillResult | None:
-        """Return how the skill ended; see `Body`."""
         try:
             if self._sent is None or not self._sent.done:
                 return None
@@ -107,19 +104,16 @@ class DomainBody(Body):
         return SkillResult(ended.success, ended.stage, ended.slot or None, ended.reason, timings, value)
 
     def cancel(self) -> None:
-        """Cancel the skill; see `Body`."""
         self._canceling = True
         if self._goal is not None:
             self._goal.cancel()
 
     def stop_motors(self) -> None:
-        """Stop; see `Body`."""
         if not self._stopper.ready():
             raise RosError("Nobody offers '/safety/stop'.")
         self._stopper.call(Trigger_Request())
 
     def picture(self, camera: str) -> Picture | None:
-        """Return what a camera shows; see `Body`."""
         images, seen = self._listen(public.image(camera, public.COLOR_JPEG)), self._listen(f"/objects/{camera}")
         until(self._node, lambda: images.latest() is not None, SEARCH)
         message, sightings = images.latest(), seen.latest()
@@ -135,7 +129,6 @@ class DomainBody(Body):
         return Picture(drawn(np.asarray(bgr[:, :, ::-1], np.uint8)), found)
 
     def step(self) -> None:
-        """Take what has come; see `Body`."""
         self._node.spin_once(SPIN)
         for name, (heard, before) in self._heard.items():
             if heard.count() != before:

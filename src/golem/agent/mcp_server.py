@@ -7,15 +7,60 @@ import base64
 import hmac
 import json
 from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
 from golem import __version__
-from golem.agent.answers import words
-from golem.agent.desk import RESOURCES, Answer, Call, Desk
-from golem.agent.tools import tool_specs
+from golem.agent.answers import answer_schema, words
+from golem.agent.desk import OWN, RESOURCES, STILL, Answer, Call, Desk
+from golem.agent.tool_rules import ToolRule
 from golem.errors import MissingExtra
 from golem.interfaces.payloads import Feedback
+from golem.skills.spec import Schema, SkillSpec
+
+_ASKS = {"free": "", "ask": " The operator is asked first.", "never": " The rules do not allow it."}
+
+
+@dataclass(frozen=True)
+class ToolSpec:
+    """A tool."""
+
+    name: str
+    text: str
+    takes: Schema
+    gives: Schema
+    still: bool
+
+
+def tool_specs(desk: Desk) -> list[ToolSpec]:
+    """Return every tool of a desk, the fields of its goal as narrow as the rules make them."""
+    done: Schema = {"type": "object", "properties": {"success": {"type": "boolean"}}, "required": ["success"]}
+    own = [ToolSpec(spec.name, spec.summary, spec.goal, done, True) for spec in OWN.values()]
+    return own + [_of_skill(spec, desk.rules.of(name)) for name, spec in sorted(desk.body.specs.items())]
+
+
+def _of_skill(spec: SkillSpec, rule: ToolRule) -> ToolSpec:
+    takes = spec.goal
+    for name, allowed in rule.fields.items():
+        takes = _narrowed(takes, name.split("."), allowed)
+    text = f"{spec.summary}.{_ASKS[rule.run]}"
+    return ToolSpec(spec.name, text, takes, answer_schema(spec.result), spec.name in STILL)
+
+
+def _narrowed(schema: Schema, path: list[str], allowed: list[Any]) -> Schema:
+    of = schema.get("properties", {}).get(path[0])
+    if of is None:
+        return schema
+    narrow = (
+        {"enum": allowed} if isinstance(allowed[0], str) else dict(zip(("minimum", "maximum"), allowed, strict=True))
+    )
+    if len(path) > 1:
+        of = _narrowed(of, path[1:], allowed)
+    else:
+        of = of | ({"items": of["items"] | narrow} if "items" in of else narrow)
+    return schema | {"properties": schema["properties"] | {path[0]: of}}
+
 
 SCHEME = "golem://"
 LARGEST = 1 << 20

@@ -55,7 +55,6 @@ class SentencePlanner:
     """Does errands by `use`."""
 
     def __init__(self, use: Use) -> None:
-        """Use tools by `use`."""
         self._use = use
 
     def do(self, words: str) -> ErrandReport:
@@ -72,7 +71,6 @@ class SentencePlanner:
         raise ConfigError(f"The planner does not know how to '{shorten(words)}'; say it as in {EXAMPLES}.")
 
     def _recall(self, thing: str, tense: str, when: str = "") -> Spot | None:
-        """Return where something is or was."""
         past = tense in ("was", "stood")
         question: dict[str, Any] = {"text": thing, "when": "history" if past else "now", "limit": 20}
         number, _, span = when.partition(" ")

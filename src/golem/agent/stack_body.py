@@ -54,26 +54,21 @@ class StackBody(Body):
         return self._running.busy
 
     def begin(self, skill: str, fields: Mapping[str, Any]) -> None:
-        """Begin a skill; see `Body`."""
         safety = self._running.safety
         if safety is not None and safety.stopped:
             raise GolemError(f"The safety gate has stopped the robot: {safety.why}.")
         self._run = self._running.start(skill, fields)
 
     def said(self) -> Feedback | None:
-        """Return news of the skill; see `Body`."""
         return self._news.read()
 
     def result(self) -> SkillResult | None:
-        """Return how the skill ended; see `Body`."""
         return None if self._run is None else self._run.result
 
     def cancel(self) -> None:
-        """Cancel the skill; see `Body`."""
         self._running.cancel()
 
     def stop_motors(self) -> None:
-        """Stop; see `Body`."""
         self._running.request(OperatorRequest.STOP)
         self.step()
 
@@ -88,7 +83,6 @@ class StackBody(Body):
         return {"frame": frame, "places": told}
 
     def picture(self, camera: str) -> Picture | None:
-        """Return what a camera shows; see `Body`."""
         frame = self._bus.latest(topics.rgbd_images(camera))
         if frame is None or self.t - frame.t > FRESH:
             return Picture(drawn(self._robot.capture(camera)[0]), ())
@@ -99,7 +93,6 @@ class StackBody(Body):
         return Picture(drawn(frame.rgb, [(o.label, o.detection.box.tolist()) for o in found]), listed)
 
     def step(self) -> None:
-        """Let time pass, up to `STEP`, or the end of the skill; see `Body`."""
         run, running = self._run, self._running
 
         def over() -> bool:

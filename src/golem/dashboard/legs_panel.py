@@ -26,14 +26,9 @@ AMBER = "#c25a10"
 
 
 class LegsPanel:
-    """Sliders and push controls of one server, inside the envelope of the leg controller in charge.
-
-    Attributes:
-        stop_button, push_button: to be listened to.
-    """
+    """Sliders and push controls of one server, inside the envelope of the leg controller in charge."""
 
     def __init__(self, gui: viser.GuiApi) -> None:
-        """Add the controls to `gui`."""
         from viser import Icon
 
         with gui.add_folder("Walk"):

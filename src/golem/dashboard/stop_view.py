@@ -133,12 +133,7 @@ def nearest(state: LowState, command: LowCommand | None, limits: SafetyLimits) -
 
 
 class StopView:
-    """Shows one stop; a slider moves through the seconds around it.
-
-    Attributes:
-        url: where.
-        stop: what is shown.
-    """
+    """Shows one stop; a slider moves through the seconds around it."""
 
     def __init__(self, stop: Stop, port: int) -> None:
         """Start serving on this machine, at the moment of the stop.

@@ -51,7 +51,6 @@ class Video:
     """One video file in the making."""
 
     def __init__(self, path: Path, feature: Feature, fps: int) -> None:
-        """Create it."""
         os.environ.setdefault("SVT_LOG", "1")  # else the encoder writes a page to the terminal
         self._av, self.counts = extra("av"), np.zeros((3, 256))
         self._out = self._av.open(str(path), "w")
@@ -225,7 +224,6 @@ class DatasetWriter:
 
 
 def _column(values: NDArray[Any], feature: Feature) -> Any:
-    """Return the Arrow column of (n, ...) values."""
     pa = extra("pyarrow")
     flat, n = pa.array(values.reshape(-1)), len(values)
     if len(feature.shape) == 1:

@@ -164,7 +164,6 @@ class GolemEnv(gym.Env[dict[str, Any], Any]):
         return outcome
 
     def _run(self, index: int, told: Line, seen: Line) -> None:
-        """Run one trial, in its thread."""
         from golem.evaluation.base import RUNGS as TARGETS
         from golem.evaluation.base import TrialSpec, make_rung
         from golem.evaluation.episodes.oracle import Oracle

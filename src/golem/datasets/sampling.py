@@ -86,9 +86,6 @@ class StackRecorder:
     """Records a stack in lock-step as one episode; a node of its executor.
 
     Only the last stretch without a gap is recorded of an episode that `stages` limit.
-
-    Attributes:
-        begun: whether there are any frames.
     """
 
     def __init__(self, writer: DatasetWriter, what: Recipe, bus: Bus, task: str, stages: tuple[str, ...] = ()) -> None:

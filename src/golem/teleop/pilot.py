@@ -93,7 +93,6 @@ class HandPilot:
     """
 
     def __init__(self, config: PilotConfig | None = None) -> None:
-        """Start without windows."""
         self.config, self.state = config or PilotConfig(), ""
         self._windows: dict[str, _Window] = {}
         self._lock, self._orders = threading.Lock(), list[str]()

@@ -2,27 +2,163 @@
 
 from __future__ import annotations
 
+import itertools
+import json
+import threading
+import time
 import webbrowser
-from contextlib import ExitStack, closing
+from collections.abc import Callable
+from contextlib import ExitStack, closing, suppress
 from dataclasses import dataclass, field
+from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
+import numpy as np
+from scipy.spatial.transform import Rotation
 from tyro.conf import OmitArgPrefixes, Positional, arg
 
 from golem.dashboard.live import LiveView
+from golem.dashboard.server import WORLD
 from golem.datasets.commands import TASK, PictureOptions
 from golem.datasets.episode_writer import DatasetWriter
 from golem.datasets.sampling import StackRecorder
+from golem.errors import ConfigError, MissingExtra
 from golem.interfaces import topics
+from golem.middleware.web_gate import LOCAL, TokenGate, is_loopback
 from golem.run import no_display, shown
 from golem.runtime.lockstep import LockstepRunner, build
 from golem.stack import load_stack
 from golem.teleop.driving import Driving
-from golem.teleop.gizmos import Gizmos
-from golem.teleop.page import PilotPage
-from golem.teleop.pilot import HandPilot, PilotConfig
-from golem.types import SIDES
+from golem.teleop.pilot import BadMessage, HandPilot, PilotConfig
+from golem.types import SIDES, Array, Side
+
+MOST, WINDOWS = 4096, 16
+"""Bytes of a message, and windows at once."""
+
+
+class PilotPage:
+    """Serves the page at `url`, and hears its windows."""
+
+    def __init__(self, pilot: HandPilot, host: str, port: int, view: str, status: Callable[[], dict[str, Any]]) -> None:
+        """Serve at `host` and `port`, with the live view at `view` in it, and tell windows the `status`.
+
+        Raises:
+            ConfigError: the address cannot be had.
+            MissingExtra: the extra `view` is not installed.
+        """
+        try:
+            from websockets.datastructures import Headers
+            from websockets.exceptions import ConnectionClosed
+            from websockets.http11 import Response
+            from websockets.sync.server import serve
+        except ModuleNotFoundError as error:
+            raise MissingExtra(error.name or "websockets", "view") from error
+        self._pilot, self._status, self._numbers = pilot, status, itertools.count(1)
+        self._room, self._gone = threading.BoundedSemaphore(WINDOWS), (ConnectionClosed, OSError)
+        body = (files("golem.teleop") / "pilot.html").read_text(encoding="utf-8").replace("%VIEW%", view).encode()
+        headers = Headers({"Content-Type": "text/html; charset=utf-8", "Content-Length": str(len(body))})
+
+        def page(connection: Any, request: Any) -> Any:
+            asks = request.headers.get("Upgrade", "").lower() == "websocket"
+            return None if asks else Response(200, "OK", headers, body)
+
+        local = is_loopback(host)
+        try:
+            self._server = serve(
+                self._serve, host if local else "127.0.0.1", port if local else 0, origins=[LOCAL, None],
+                process_request=page, max_size=MOST, compression=None, ping_interval=1.0, ping_timeout=1.0,
+            )  # fmt: skip
+        except (OSError, OverflowError) as error:
+            raise ConfigError(f"Cannot serve the page at {host}:{port} ({error}); choose another port.") from error
+        inside = int(self._server.socket.getsockname()[1])
+        self._gate = None if local else TokenGate(host, port, inside)
+        self.url = f"http://{host}:{inside}/"
+        if self._gate is not None:
+            self.url = f"http://{host}:{self._gate.port}/?token={self._gate.token}"
+        threading.Thread(target=self._server.serve_forever, name="pilot's page", daemon=True).start()
+
+    def _serve(self, connection: Any) -> None:
+        if not self._room.acquire(blocking=False):
+            connection.close(1013, "There are too many windows.")
+            return
+        who = f"window {next(self._numbers)}"
+        try:
+            with suppress(*self._gone):
+                while True:
+                    raw, error = connection.recv(), ""
+                    try:
+                        self._pilot.hear(who, json.loads(raw, parse_constant=_no_constant), time.monotonic())
+                    except (BadMessage, ValueError, RecursionError) as wrong:
+                        self._pilot.leave(who)
+                        error = str(wrong) or "That is no JSON."
+                    told = {"you": who, "pilot": self._pilot.state, "error": error, **self._status()}
+                    connection.send(json.dumps(told))
+        finally:
+            self._pilot.leave(who)
+            self._room.release()
+
+    def close(self) -> None:
+        """Stop serving."""
+        if self._gate is not None:
+            self._gate.close()
+        self._server.shutdown()
+
+
+def _no_constant(name: str) -> float:
+    raise ValueError(f"{name} is no number.")
+
+
+if TYPE_CHECKING:
+    import viser
+
+
+class Gizmos:
+    """Two gizmos of one server, and what is refused at them."""
+
+    def __init__(
+        self, server: viser.ViserServer, from_odom: Callable[[Array], Array], pilot: HandPilot, driving: Driving
+    ) -> None:
+        """Add them; `from_odom` brings a point (3,) of odom into the world that is shown, whose axes are the same."""
+        self._origin, self._pilot, self._driving = from_odom(np.zeros(3)), pilot, driving
+        self._held: set[Side] = set()
+        self._gizmos, self._labels = {}, {}
+        for side in SIDES:
+            gizmo = server.scene.add_transform_controls(f"{WORLD}/{side}_goal", scale=0.15, visible=False)
+            label = server.scene.add_label(f"{WORLD}/{side}_refused", "", visible=False)
+            gizmo.on_update(lambda event, side=side: self._drag(event, side))
+            self._gizmos[side], self._labels[side] = gizmo, label
+        server.on_client_disconnect(lambda client: self._gone(str(client.client_id)))
+
+    def _drag(self, event: Any, side: Side) -> None:
+        if event.phase == "end":
+            self._held.discard(side)
+        else:
+            self._held.add(side)
+        goal = None
+        if side in self._held:
+            goal, gizmo = np.eye(4), self._gizmos[side]
+            goal[:3, :3] = Rotation.from_quat(np.asarray(gizmo.wxyz), scalar_first=True).as_matrix()
+            goal[:3, 3] = np.asarray(gizmo.position) - self._origin
+        self._pilot.drag(f"view {event.client_id}", side, goal, time.monotonic())
+
+    def _gone(self, client: str) -> None:
+        self._held.clear()
+        self._pilot.leave(f"view {client}")
+
+    def show(self, poses: dict[Side, Array]) -> None:
+        """Show the gizmos that nobody drags at `poses` (4, 4) in odom, and what is refused."""
+        for side in SIDES:
+            gizmo, label, why = self._gizmos[side], self._labels[side], self._driving.refused[side]
+            T = poses[side]
+            if side not in self._held:
+                gizmo.position = T[:3, 3] + self._origin
+                gizmo.wxyz = Rotation.from_matrix(T[:3, :3]).as_quat(scalar_first=True)
+                gizmo.visible = True
+            label.visible = bool(why)
+            if why:
+                label.text, label.position = why, np.asarray(gizmo.position)
+
 
 SHOWN = 0.05
 """Time between two updates of the gizmos [s]."""

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from golem.evaluation.harness import own_time
-from golem.evaluation.harness.own_time import OwnTime
+from golem.evaluation.harness import local_executor
+from golem.evaluation.harness.local_executor import OwnTime
 
 pytestmark = pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="no /proc here")
 BUSY = "import time; end = time.monotonic() + 20.0\nwhile time.monotonic() < end: pass"
@@ -62,8 +62,8 @@ def test_who_starves_takes_what_it_gets(started: list[subprocess.Popen[bytes]]) 
 def test_what_children_compute_counts_once_they_have_ended(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of 10 s, 4 were spent waiting, all threads together; then 12 by three threads at once, of which 6 computing."""
     now, states = [0.0], iter([(0.0, 0.0, False), (6.0, 4.0, False), (12.0, 16.0, False), (12.0, 2.0, False)])
-    monkeypatch.setattr(own_time, "_state", lambda pid: next(states))
-    monkeypatch.setattr(own_time.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(local_executor, "_state", lambda pid: next(states))
+    monkeypatch.setattr(local_executor.time, "monotonic", lambda: now[0])
     clock = OwnTime(1)
     found = []
     for now[0] in (10.0, 20.0, 25.0):  # noqa: B020 - the clock

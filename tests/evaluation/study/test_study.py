@@ -19,8 +19,7 @@ from golem.evaluation.metrics.anytime import anytime_interval
 from golem.evaluation.metrics.sequential import StopRule
 from golem.evaluation.metrics.statistics import wilson
 from golem.evaluation.report.site import PublishConfig, run_publish
-from golem.evaluation.study.plan import simulated, smallest_difference
-from golem.evaluation.study.study_command import StudyConfig, run_study_command
+from golem.evaluation.study.study_command import StudyConfig, run_study_command, simulated, smallest_difference
 from golem.evaluation.study.study_file import read_study_file
 from golem.evaluation.study.study_folder import CellResult, Study, read_study
 

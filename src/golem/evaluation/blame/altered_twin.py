@@ -98,7 +98,6 @@ class TrueBase:
     """A `BaseEstimator` that knows pose, velocity and contacts of the base."""
 
     def __init__(self) -> None:
-        """Look into the twin of the trial."""
         self._truth = AlteredTwin.newest().truth
 
     def reset(self, state: LowState) -> None:
@@ -115,7 +114,6 @@ class TrueOdometry(Legs):
     sources: tuple[Source, ...] = ("imu", "legs", "scan")
 
     def __init__(self) -> None:
-        """Look into the twin of the trial."""
         super().__init__()
         self._truth = AlteredTwin.newest().truth
 

@@ -87,7 +87,6 @@ def _does(stack: Stack) -> set[str]:
 
 
 def _numbers(stack: Stack) -> tuple[object, ...]:
-    """Return what a trial of `stack` depends on."""
     choices = {key: stack.choice(key) for key in KEYS}
     robot = registry.configure("robot", ALTERED, choices.pop("robot").options)
     return choices, robot, replace(load_profile(stack.profile), name="")

@@ -17,7 +17,7 @@ from golem.interfaces.payloads import ArmCommand
 from golem.robots.model.pinocchio_model import Kinematics
 from golem.robots.model.table import load_limits
 from golem.runtime.contract_check import ContractCheck
-from golem.runtime.nodes import MIN_RATE, ArmLimits
+from golem.runtime.nodes import ArmLimits
 from golem.types import UPPER, Array
 
 TICKS = 60
@@ -40,28 +40,19 @@ class ArmSuite(Suite):
     """Inputs are palm targets, answers arm commands."""
 
     slot, contracts = "upper_body", (UpperBody,)
+    late = rated = True
 
     def __init__(self) -> None:
         """Find where the palms are in the posture of the samples."""
         kinematics = Kinematics()
         kinematics.update(samples.posture())
         self._palms = [kinematics.pose(f"{side}_gripper").copy() for side in ("left", "right")]
-        self._dt = 0.02
-
-    def declared(self, contract: ContractCheck, module: Any) -> None:
-        """Check rate and latency."""
-        self._dt = 1.0 / contract.number("rate", module.rate, minimum=MIN_RATE)
-        contract.number("latency", module.latency, minimum=0.0)
-
-    def allowed(self, module: UpperBody) -> float:
-        """Return its period and its latency [s]."""
-        return 1.0 / module.rate + module.latency
 
     def _to(self, x: float, y: float, z: float, count: int = TICKS) -> list[ArmInput]:
         """Return ticks with a target for the right palm, which lies so far from where it is [m]; the left is free."""
         target = self._palms[1].copy()
         target[:3, 3] += x, y, z
-        return [ArmInput(None, target.copy(), samples.posture(), self._dt) for _ in range(count)]
+        return [ArmInput(None, target.copy(), samples.posture(), self.dt) for _ in range(count)]
 
     def inputs(self) -> Sequence[ArmInput]:
         """Return a target a little ahead of the right palm."""
@@ -76,14 +67,13 @@ class ArmSuite(Suite):
             "a target behind the robot": self._to(-1.2, 0.0, 0.2),
             "a target at the robot's middle": self._to(*(-self._palms[1][:3, 3])),
             "both palms in one place": [one._replace(left=self._palms[1].copy()) for one in self._to(0.0, 0.2, 0.0)],
-            "no target": [ArmInput(None, None, samples.posture(), self._dt)] * 10,
+            "no target": [ArmInput(None, None, samples.posture(), self.dt)] * 10,
         }
         for name, q in wide.items():
             cases[f"joints at their {name} limits"] = [one._replace(q=q.copy()) for one in self._to(0.0, 0.0, WAY, 20)]
         return cases
 
     def spoiled(self) -> Mapping[str, ArmInput]:
-        """Return targets and joints with a NaN each."""
         sound = self.inputs()[0]
         return {
             "a target": sound._replace(right=samples.with_nan(self._palms[1])),
@@ -91,15 +81,12 @@ class ArmSuite(Suite):
         }
 
     def begin(self, module: UpperBody, first: ArmInput) -> None:
-        """Reset it."""
         module.reset(first.q)
 
     def call(self, module: UpperBody, given: ArmInput) -> ArmCommand:
-        """Return its command."""
         return module.step(given.left, given.right, given.q, given.dt)
 
     def judge(self, contract: ContractCheck, answer: Any) -> None:
-        """Check a command."""
         contract.kind("the arm command", answer, ArmCommand)
         contract.array("q", answer.q, NUM_UPPER)
         contract.array("error_position", answer.error_position, 2)
@@ -110,7 +97,7 @@ class ArmSuite(Suite):
     def targets_keep_the_limits(self, candidate: Candidate) -> None:
         """Joint targets keep position and velocity limits, whatever is asked for."""
         for what, inputs in {"an ordinary target": self.inputs(), **self.edges()}.items():
-            limits = ArmLimits(candidate.contract, self._dt)
+            limits = ArmLimits(candidate.contract, self.dt)
             limits.reset(inputs[0].q)
             for answer in self.run(candidate, inputs):
                 try:
@@ -130,7 +117,7 @@ class ArmSuite(Suite):
         left = float(np.linalg.norm(kinematics.pose("right_gripper")[:3, 3] - target[:3, 3]))
         if left > REACHED * WAY:
             raise candidate.fault(
-                f"after {TICKS * self._dt:.3g} s, {100.0 * left:.3g} cm of {100.0 * WAY:g} cm are left"
+                f"after {TICKS * self.dt:.3g} s, {100.0 * left:.3g} cm of {100.0 * WAY:g} cm are left"
             )
 
     @check

@@ -111,7 +111,6 @@ def _quiet() -> Iterator[None]:
 
 
 def _wanted(config: CheckConfig) -> list[tuple[str, str]]:
-    """Return which modules are to be checked."""
     if config.use:
         return [(config.slot, config.use)]
     slots = [config.slot] if config.slot else list(SUITES)

@@ -37,19 +37,15 @@ class EstimatorSuite(Suite):
         return held | {"a robot in free fall": falling}
 
     def spoiled(self) -> Mapping[str, LowState]:
-        """Return states with a NaN each."""
         return samples.spoiled_states(4 * TICK)
 
     def begin(self, module: BaseEstimator, first: LowState) -> None:
-        """Reset it."""
         module.reset(first)
 
     def call(self, module: BaseEstimator, given: LowState) -> BaseEstimate:
-        """Return its estimate."""
         return module.step(given, TICK)
 
     def judge(self, contract: ContractCheck, answer: Any) -> None:
-        """Check an estimate."""
         contract.kind("the estimate", answer, BaseEstimate)
         contract.array("T_odom_base", answer.T_odom_base, 4, 4)
         contract.array("velocity", answer.velocity, 3)

@@ -138,12 +138,7 @@ def choice_of(use: str) -> tuple[str, Mapping[str, object]]:
 
 
 def examine(subject: Candidate, on_check: Callable[[Check], None] = lambda check: None) -> Report:
-    """Run every check of the suite of its slot on `subject`; nothing that the module does is raised.
-
-    Args:
-        subject: the module.
-        on_check: called before each check.
-    """
+    """Run every check of the suite of its slot on `subject`; nothing that the module does is raised."""
     with searching_forbidden():
         return run_suite(suite_of(subject.slot), subject, on_check)
 

@@ -79,7 +79,6 @@ class GraspSuite(Suite):
         }
 
     def spoiled(self) -> Mapping[str, GraspInput]:
-        """Return objects with a NaN each."""
         return {"the position": above(samples.seen_object(0.1, samples.with_nan(PLACE, 0)))}
 
     def call(self, module: GraspMethod, given: GraspInput) -> GraspAnswer:
@@ -107,7 +106,6 @@ class GraspSuite(Suite):
         return steps
 
     def judge(self, contract: ContractCheck, answer: GraspAnswer) -> None:
-        """Check proposals and steps."""
         for grasp in answer.grasps:
             contract.kind("a proposal", grasp, Grasp)
             contract.array("T_odom_gripper", grasp.T_odom_gripper, 4, 4)

@@ -70,7 +70,6 @@ class HandSuite(Suite):
         }
 
     def spoiled(self) -> Mapping[str, HandInput]:
-        """Return reports and requests with a NaN each."""
         t = 3 * PERIOD
         return {
             "the gap": HandInput(samples.hand_state(t, samples.NAN)),
@@ -87,7 +86,6 @@ class HandSuite(Suite):
         return HandAnswer(command, module.status())
 
     def judge(self, contract: ContractCheck, answer: HandAnswer) -> None:
-        """Check a command and a status."""
         command: Any = answer.command
         contract.kind("the hand command", command, HandCommand)
         contract.number("gap", command.gap, minimum=0.0)

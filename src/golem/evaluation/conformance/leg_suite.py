@@ -18,7 +18,6 @@ from golem.interfaces.payloads import LegCommand
 from golem.robots.model.table import load_limits
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.lower_body_node import MAX_LATENCY
-from golem.runtime.nodes import MIN_RATE
 from golem.types import LEGS, BaseEstimate, LowState, Twist
 
 TICKS = 24
@@ -43,31 +42,26 @@ class LegSuite(Suite):
     """Inputs are states with twists and gait phases, answers leg commands."""
 
     slot, contracts = "lower_body", (LowerBody,)
+    late = rated = True
 
     def __init__(self) -> None:
-        """Give ticks of 50 Hz until the module says what it wants."""
-        self._dt, self._envelope = 0.02, Envelope()
+        """Ask for nothing until the module says what it can."""
+        self._envelope = Envelope()
 
     def context(self) -> Mapping[str, object]:
         """Return an on-board controller that answers every call."""
         return {"onboard": StillOnboard()}
 
     def declared(self, contract: ContractCheck, module: Any) -> None:
-        """Check rate, latency, envelope and gait."""
-        self._dt = 1.0 / contract.number("rate", module.rate, minimum=MIN_RATE)
-        latency = contract.number("latency", module.latency, minimum=0.0)
-        if latency > MAX_LATENCY:
-            raise contract.fault(f"its latency is {latency:g} s, legs need at most {MAX_LATENCY:g} s")
+        super().declared(contract, module)
+        if module.latency > MAX_LATENCY:
+            raise contract.fault(f"its latency is {module.latency:g} s, legs need at most {MAX_LATENCY:g} s")
         self._envelope = contract.kind("envelope", module.envelope, Envelope)
         contract.kind("gait", module.gait, GaitConfig)
 
-    def allowed(self, module: LowerBody) -> float:
-        """Return its period and its latency [s]."""
-        return 1.0 / module.rate + module.latency
-
     def _ticks(self, motion: LocomotionCommand, count: int = TICKS, **changes: Any) -> list[LegInput]:
-        times = [self._dt * (i + 1) for i in range(count)]
-        return [LegInput(samples.state(t), samples.base(t, **changes), motion, self._dt) for t in times]
+        times = [self.dt * (i + 1) for i in range(count)]
+        return [LegInput(samples.state(t), samples.base(t, **changes), motion, self.dt) for t in times]
 
     def inputs(self) -> Sequence[LegInput]:
         """Return a robot that stands."""
@@ -88,15 +82,13 @@ class LegSuite(Suite):
         return cases
 
     def _walk(self, twist: Twist) -> list[LegInput]:
-        """Return two steps at `twist`."""
-        count = round(1.2 / self._dt)
+        count = round(1.2 / self.dt)
         walking = self._ticks(STANDING, count)
-        phases = [np.array([0.0, 0.5]) + 1.25 * self._dt * i for i in range(count)]
+        phases = [np.array([0.0, 0.5]) + 1.25 * self.dt * i for i in range(count)]
         motions = [LocomotionCommand(twist, phase % 1.0, True, twist != Twist()) for phase in phases]
         return [one._replace(motion=motion) for one, motion in zip(walking, motions, strict=True)]
 
     def spoiled(self) -> Mapping[str, LegInput]:
-        """Return states, estimates and twists with a NaN each."""
         sound = self.inputs()[3]
         cases = {where: sound._replace(state=s) for where, s in samples.spoiled_states(sound.state.t).items()}
         cases["the pose of the base"] = sound._replace(
@@ -108,15 +100,12 @@ class LegSuite(Suite):
         return cases
 
     def begin(self, module: LowerBody, first: LegInput) -> None:
-        """Reset it."""
         module.reset(first.state)
 
     def call(self, module: LowerBody, given: LegInput) -> Any:
-        """Return its command."""
         return module.step(given.state, given.base, given.motion, given.dt)
 
     def judge(self, contract: ContractCheck, answer: Any) -> None:
-        """Check a command."""
         contract.kind("the leg command", answer, LegCommand)
         for name in ("q", "kp", "kd"):
             contract.array(name, getattr(answer, name), JOINTS)

@@ -41,11 +41,7 @@ class LocalizerSuite(Suite):
     """Inputs are frames with labels, answers lists of objects."""
 
     slot, contracts, forgets = "localizer", (Localizer,), False
-    late = True
-
-    def allowed(self, module: Localizer) -> float:
-        """Return its latency [s]."""
-        return max(module.latency, TICK)
+    late, takes = True, TICK
 
     def inputs(self) -> Sequence[LocalizerInput]:
         """Return frames of two cameras that look down on a plate with dark spots."""
@@ -77,11 +73,9 @@ class LocalizerSuite(Suite):
         return [self.inputs()[0]] * 2
 
     def call(self, module: Localizer, given: LocalizerInput) -> list[LocalizedObject]:
-        """Return what it sees."""
         return list(module.locate(given.frame, asked(module, given.labels)))
 
     def judge(self, contract: ContractCheck, answer: Any) -> None:
-        """Check objects."""
         for found in answer:
             contract.kind("a located object", found, LocalizedObject)
             contract.kind("its detection", found.detection, Detection)
@@ -99,7 +93,6 @@ class LocalizerSuite(Suite):
                     raise contract.fault(f"its mask has {pixels} pixels, its cloud {len(found.points)} points")
 
     def _seen(self, candidate: Candidate) -> list[tuple[LocalizerInput, list[LocalizedObject]]]:
-        """Return what it saw in frames in which it saw anything."""
         pairs = zip(self.inputs(), self.answers_of(candidate), strict=True)
         seen = [(given, answer) for given, answer in pairs if answer]
         if not seen:

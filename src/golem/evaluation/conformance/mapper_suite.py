@@ -43,7 +43,6 @@ class MapperSuite(Suite):
     takes = TENTH
 
     def declared(self, contract: ContractCheck, module: Any) -> None:
-        """Check its rate."""
         contract.number("rate", module.rate, minimum=0.1)
 
     def inputs(self) -> Sequence[Scan]:
@@ -65,7 +64,6 @@ class MapperSuite(Suite):
         }
 
     def spoiled(self) -> Mapping[str, Scan]:
-        """Return scans with a NaN each."""
         scan = self.inputs()[3]
         return {
             "a point": replace(scan, points=with_nan(scan.points)),
@@ -74,7 +72,6 @@ class MapperSuite(Suite):
         }
 
     def begin(self, module: Mapper, first: Scan) -> None:
-        """Reset it."""
         module.reset()
 
     def call(self, module: Mapper, given: Scan) -> MapAnswer:
@@ -83,7 +80,6 @@ class MapperSuite(Suite):
         return MapAnswer(module.grid(), module.T_odom_map)
 
     def judge(self, contract: ContractCheck, answer: Any) -> None:
-        """Check a map."""
         if answer.place is not None:
             contract.kind("T_odom_map", answer.place, PlanarPose)
             for name in ("x", "y", "yaw"):

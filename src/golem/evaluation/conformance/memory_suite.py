@@ -71,7 +71,6 @@ class MemorySuite(Suite):
         }
 
     def spoiled(self) -> Mapping[str, Observation]:
-        """Return looks with a NaN each."""
         one = look(0.6)
         T = samples.with_nan(one.frame.T_odom_optical)
         thing = one.objects[0]
@@ -92,12 +91,10 @@ class MemorySuite(Suite):
         ]
 
     def judge(self, contract: ContractCheck, answer: Any) -> None:
-        """Check places."""
         for place in contract.kind("what it returns", answer, list):
             check_place(contract, place)
 
     def _after(self, candidate: Candidate) -> Memory:
-        """Return a memory that saw the ordinary looks."""
         module = candidate.make()
         self.run(candidate, self.inputs(), module)
         return module

@@ -17,7 +17,6 @@ from golem.evaluation.conformance.suite import Suite
 from golem.interfaces.nav_payloads import Nav2Reply, NavStep, OccupancyGrid, Scan
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.navigator_node import NavigatorNode
-from golem.runtime.nodes import MIN_RATE
 from golem.types import PlanarPose, Twist
 
 MAX_RATE = 1.0 / NavigatorNode.period
@@ -81,26 +80,16 @@ class NavigatorSuite(Suite):
     """Inputs are poses on the way to a goal, answers twists."""
 
     slot, contracts, forgets = "navigator", (Navigator,), False
-
-    def __init__(self) -> None:
-        """Step at 100 Hz until the module says what it wants."""
-        self._period = 1.0 / MAX_RATE
+    late = rated = True
 
     def context(self) -> Mapping[str, object]:
         """Return a Nav2 that has arrived as soon as it is asked: the rest is the navigator's."""
         return {"nav2": _ArrivedNav2()}
 
     def declared(self, contract: ContractCheck, module: Any) -> None:
-        """Check rate and latency."""
-        rate = contract.number("rate", module.rate, minimum=MIN_RATE)
-        if rate > MAX_RATE:
-            raise contract.fault(f"its rate is {rate:g} Hz, a navigator has at most {MAX_RATE:g} Hz")
-        self._period = 1.0 / rate
-        contract.number("latency", module.latency, minimum=0.0)
-
-    def allowed(self, module: Navigator) -> float:
-        """Return its period and its latency [s]."""
-        return 1.0 / module.rate + module.latency
+        super().declared(contract, module)
+        if module.rate > MAX_RATE:
+            raise contract.fault(f"its rate is {module.rate:g} Hz, a navigator has at most {MAX_RATE:g} Hz")
 
     def inputs(self) -> Sequence[NavigatorInput]:
         """Return a robot on its way."""
@@ -128,19 +117,15 @@ class NavigatorSuite(Suite):
         return cases
 
     def spoiled(self) -> Mapping[str, NavigatorInput]:
-        """Return a pose with a NaN."""
         return {"the pose": at(PlanarPose(samples.NAN, 0.0, 0.0), True)}
 
     def begin(self, module: Navigator, first: NavigatorInput) -> None:
-        """Give it the goal."""
         module.start(first.goal)
 
     def call(self, module: Navigator, given: NavigatorInput) -> NavStep:
-        """Return its step."""
-        return module.step(given.inputs, self._period)
+        return module.step(given.inputs, self.dt)
 
     def judge(self, contract: ContractCheck, answer: Any) -> None:
-        """Check a step."""
         contract.kind("the course", answer, NavStep)
         contract.kind("twist", answer.twist, Twist)
         for name in ("vx", "vy", "wz"):
@@ -155,16 +140,16 @@ class NavigatorSuite(Suite):
         module, contract = candidate.make(), candidate.contract
         contract.call(module.start, GOAL)
         pose, moving, answers = PlanarPose(0.0, 0.0, 0.0), False, list[NavStep]()
-        for i in range(round(PATIENCE / self._period)):
+        for i in range(round(PATIENCE / self.dt)):
             # A new scan ten times a second, as a LiDAR has it.
-            t = 0.1 * (1 + math.floor(10.0 * self._period * i))
+            t = 0.1 * (1 + math.floor(10.0 * self.dt * i))
             answer = contract.call(self.call, module, at(pose, moving, t=t))
             answers.append(answer)
             if answer.ended:
                 break
             v = answer.twist
             moving = v != Twist()
-            pose = pose @ PlanarPose(v.vx * self._period, v.vy * self._period, v.wz * self._period)
+            pose = pose @ PlanarPose(v.vx * self.dt, v.vy * self.dt, v.wz * self.dt)
         return pose, answers
 
     @check

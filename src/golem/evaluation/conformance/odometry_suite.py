@@ -61,7 +61,6 @@ class OdometrySuite(Suite):
         }
 
     def spoiled(self) -> Mapping[str, Tenth]:
-        """Return readings with a NaN each."""
         tenth = self.inputs()[3]
         changes: dict[str, Any] = {
             "the gyro": lambda r: replace(r, gyro=with_nan(r.gyro)) if isinstance(r, LidarImu) else r,
@@ -84,7 +83,6 @@ class OdometrySuite(Suite):
         return {where: tuple(map(change, tenth)) for where, change in changes.items()}
 
     def begin(self, module: LidarOdometry, first: Tenth) -> None:
-        """Reset it."""
         module.reset()
 
     def call(self, module: LidarOdometry, given: Tenth) -> OdometryEstimate | None:
@@ -101,7 +99,6 @@ class OdometrySuite(Suite):
         return module.estimate()
 
     def judge(self, contract: ContractCheck, answer: Any) -> None:
-        """Check an estimate."""
         if answer is None:
             return
         contract.kind("the estimate", answer, OdometryEstimate)

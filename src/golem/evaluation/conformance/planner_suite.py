@@ -53,7 +53,6 @@ class PlannerSuite(Suite):
         }
 
     def spoiled(self) -> Mapping[str, PlanRequest]:
-        """Return requests with a NaN each."""
         one = self.inputs()[0]
         return {
             "the start": replace(one, q=samples.with_nan(one.q)),
@@ -70,7 +69,6 @@ class PlannerSuite(Suite):
             return refusal
 
     def judge(self, contract: ContractCheck, answer: Any) -> None:
-        """Check a plan."""
         if isinstance(answer, PlanRefused):
             return
         contract.kind("the plan", answer, Plan)

@@ -20,11 +20,7 @@ class PropertySuite(Suite):
     """Inputs are names, answers properties, or that the name is none it knows."""
 
     slot, contracts, forgets = "properties", (PropertySource,), False
-    late = True
-
-    def allowed(self, module: PropertySource) -> float:
-        """Return its latency [s]."""
-        return max(module.latency, TICK)
+    late, takes = True, TICK
 
     def inputs(self) -> Sequence[str]:
         """Return names of common things."""
@@ -42,7 +38,6 @@ class PropertySuite(Suite):
             return refusal
 
     def judge(self, contract: ContractCheck, answer: Any) -> None:
-        """Check what it says."""
         if not isinstance(answer, ConfigError):
             contract.kind("what it says", answer, Properties)
 

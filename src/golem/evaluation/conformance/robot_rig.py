@@ -21,12 +21,7 @@ Path = Callable[[float], Array]
 
 
 class RobotRig:
-    """A robot under test.
-
-    Attributes:
-        cameras: the cameras that it has, by name.
-        calibration: see `golem.robots.base.Robot`.
-    """
+    """A robot under test."""
 
     def __init__(self, robot: Robot, posture: Array) -> None:
         """Take hold of `robot`, which is in `posture` (27,) [rad]."""

@@ -87,7 +87,6 @@ class RobotSuite(RobotMeasures, Suite):
         return RobotAnswer(module.joints(), module.imu(), hands)
 
     def judge(self, contract: ContractCheck, answer: RobotAnswer) -> None:
-        """Check a report."""
         for name, values in zip(("q", "dq", "tau"), answer.joints, strict=True):
             contract.array(name, values, NUM_JOINTS)
         contract.kind("the IMU's sample", answer.imu, Imu)

@@ -51,22 +51,18 @@ class ServoSuite(Suite):
         return held | {"legs with gains and torques of their own": standing}
 
     def spoiled(self) -> Mapping[str, ServoInput]:
-        """Return states and targets with a NaN each."""
         t = 4 * TICK
         q = samples.posture()
         cases = {where: ServoInput(s, q) for where, s in samples.spoiled_states(t).items()}
         return cases | {"the targets": ServoInput(samples.state(t), samples.with_nan(q))}
 
     def begin(self, module: MotorServo, first: ServoInput) -> None:
-        """Reset it."""
         module.reset(first.state)
 
     def call(self, module: MotorServo, given: ServoInput) -> LowCommand:
-        """Return its command."""
         return module.step(given.state, given.q, TICK, given.leg_gains, given.leg_tau)
 
     def judge(self, contract: ContractCheck, answer: Any) -> None:
-        """Check a command."""
         contract.kind("the motor command", answer, LowCommand)
         contract.number("t", answer.t)
         for name in ("q", "dq", "tau", "kp", "kd"):

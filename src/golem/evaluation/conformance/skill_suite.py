@@ -75,7 +75,6 @@ class SkillSuite(Suite):
         return SkillAnswer(run.result, seen, None if cancelled is None else running.executor.t - cancelled)
 
     def judge(self, contract: ContractCheck, answer: SkillAnswer) -> None:
-        """Check a result."""
         if answer.result is None or answer.endless:
             return
         contract.kind("the result", answer.result, SkillResult)

@@ -23,7 +23,6 @@ class StillRobot:
     unmoved = "it has no physics"
 
     def __init__(self) -> None:
-        """Stand, with open hands."""
         self.cameras = CAMERAS
         self.calibration: dict[str, Array] = {name: np.eye(4) for name in CAMERAS}
         self._q = samples.posture()
@@ -63,7 +62,6 @@ class StillOnboard:
     """The on-board computer of a robot that stands: it answers every call, and its legs hold their joints."""
 
     def __init__(self) -> None:
-        """Begin as after power-on."""
         self._service = LocoService(loco_api(LOCO_API))
         self._service.standing = True
         self._answer: Response | None = None

@@ -17,6 +17,7 @@ from golem.errors import GolemError, ModuleFault
 from golem.evaluation.conformance.base import Candidate, Inapplicable, check, gate
 from golem.evaluation.conformance.impurities import CLOCK, FILE, RANDOM, THREAD, Impurity, impurities
 from golem.runtime.contract_check import FAR, ContractCheck
+from golem.runtime.nodes import MIN_RATE
 
 
 def difference(a: Any, b: Any, where: str = "the answer") -> str:
@@ -70,15 +71,18 @@ class Suite:
         forgets: whether `begin` makes a module start over; else it is made anew where that matters.
         refuses_nan: whether NaN among its inputs must not come out of it again.
         late: whether its modules declare a latency.
-        takes: time that a call may take beside that latency [s]; infinite where none is declared.
+        rated: whether they declare a rate as well, and a call may take a period beside that latency.
+        takes: time that it may take where they do not [s]; infinite where none is declared.
+        dt: the period [s], once it was declared.
     """
 
     slot: str
     contracts: tuple[type[Any], ...]
     forgets = True
     refuses_nan = True
-    late = False
+    late = rated = False
     takes = math.inf
+    dt = 0.02
 
     def context(self) -> Mapping[str, object]:
         """Return what a stack hands to the constructor."""
@@ -86,12 +90,14 @@ class Suite:
 
     def declared(self, contract: ContractCheck, module: Any) -> None:
         """Check the numbers that `module` declares; raises `ModuleFault`."""
+        if self.rated:
+            self.dt = 1.0 / contract.number("rate", module.rate, minimum=MIN_RATE)
         if self.late:
             contract.number("latency", module.latency, minimum=0.0)
 
     def allowed(self, module: Any) -> float:
         """Return the time that a call may take [s]; infinite where none is declared."""
-        return self.takes + (module.latency if self.late else 0.0)
+        return (1.0 / module.rate if self.rated else self.takes) + (module.latency if self.late else 0.0)
 
     def inputs(self) -> Sequence[Any]:
         """Return ordinary inputs, in the order in which a robot would give them."""

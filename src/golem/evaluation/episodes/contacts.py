@@ -22,7 +22,6 @@ class ContactWatch:
     """
 
     def __init__(self, robot: MujocoRobot) -> None:
-        """Watch `robot`."""
         model = robot.scene.model
         self._robot = robot
         mine = (model.body_rootid == model.body(BASE_LINK).id)[model.geom_bodyid]

@@ -25,7 +25,6 @@ class ErrandWatch:
     """
 
     def __init__(self, running: LockstepRunner, oracle: Oracle, recorder: BalanceRecorder | None) -> None:
-        """Look at what `running` does, through `oracle`."""
         self._running, self._oracle, self.recorder = running, oracle, recorder
         self._news = News(running.bus, topics.FEEDBACK)
         self.picture: bytes | None = None
@@ -138,7 +137,6 @@ class CounterWatch(ErrandWatch):
         return series
 
     def _lifted(self) -> list[int]:
-        """Return which things of the kind were lifted."""
         return [
             k
             for k, thing in enumerate(self._before)

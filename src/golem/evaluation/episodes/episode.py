@@ -224,7 +224,6 @@ class Episode:
             self.running.executor.run(self.t + seconds, lambda: self._look() or ask(), due=both)
 
     def _due(self) -> float:
-        """Return when the judges want to look again [s]."""
         odometry = math.inf if self._odometry is None else self._odometry.due
         return min(self.recorder.due, self._pusher.due, odometry)
 

@@ -50,7 +50,6 @@ class LastSeconds:
     period = 1.0 / FPS
 
     def __init__(self) -> None:
-        """Wait for a trial to begin."""
         self._robot: MujocoRobot | None = None
         self._start()
 

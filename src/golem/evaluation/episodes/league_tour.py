@@ -84,7 +84,6 @@ class Operator:
     """
 
     def __init__(self, goal: PlanarPose) -> None:
-        """Steer to `goal`."""
         self._goal, self._rests = goal, [False, False]
 
     def steer(self, place: PlanarPose) -> Twist:

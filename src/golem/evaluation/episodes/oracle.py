@@ -128,7 +128,6 @@ class Oracle:
     """Reads the truth of one twin."""
 
     def __init__(self, robot: MujocoRobot) -> None:
-        """Look into `robot`."""
         self._robot = robot
         self._T_odom_world: Array = np.asarray(np.linalg.inv(robot.truth.T_world_odom), dtype=np.float64)
         self._rig: CameraRig | None = None

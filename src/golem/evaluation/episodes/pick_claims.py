@@ -82,7 +82,6 @@ def claims(
 
 
 def _emptied(fasteners: Sequence[Fastener], taken: set[int], place: Array | None) -> bool:
-    """Return whether the fastener that was looked at last is out."""
     near = None if place is None else _nearest(place, fasteners, SEEN)
     return near is not None and fasteners.index(near) in taken
 
@@ -100,7 +99,6 @@ def _whole(outcome: str, fasteners: Sequence[Fastener]) -> bool | None:
 
 
 def _one(tried: Tried, fasteners: Sequence[Fastener], in_tray: bool, looked: Array | None) -> bool | None:
-    """Return whether a claim about one screw is right."""
     if tried.outcome == PickOutcome.PICKED:
         return in_tray
     place = np.array([tried.x, tried.y, tried.z]) if looked is None else looked

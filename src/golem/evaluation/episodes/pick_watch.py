@@ -109,7 +109,6 @@ class PickWatch(ErrandWatch):
     def __init__(
         self, running: LockstepRunner, oracle: Oracle, recorder: BalanceRecorder | None, touches: PickTouches
     ) -> None:
-        """Look at what `running` does, through `oracle`."""
         super().__init__(running, oracle, recorder)
         self._touches = touches
         self.grasp: GraspTruth | None = None

@@ -248,7 +248,6 @@ def _elsewhere(rng: np.random.Generator, count: int, labels: Sequence[str]) -> l
 
 
 def _spots(rng: np.random.Generator, counter: int, count: int) -> list[Array]:
-    """Return places on top of a counter, apart from each other."""
     places: list[Array] = []
     while len(places) < count:
         local = rng.uniform((-0.15, -0.45), (0.15, 0.45))
@@ -299,7 +298,6 @@ def _localize(
     owners: Mapping[int, int],
     rates: Rates,
 ) -> list[LocalizedObject]:
-    """Return what a localizer with these rates finds."""
     found: list[LocalizedObject] = []
     for k, thing in enumerate(things):
         label, luck, swap = thing.kind, float(rng.random()), float(rng.random())

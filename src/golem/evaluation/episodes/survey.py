@@ -35,11 +35,6 @@ def survey(robot: MujocoRobot, seed: int, path: Path) -> None:
     """Write the map of the hall in which `robot` stands, without its obstacles, into `path`.
 
     Its frame is odom at the robot's true start. The surveyor's sensor has the noise of the robot's, and hangs straight.
-
-    Args:
-        robot: a twin at the start of its episode.
-        seed: of the episode.
-        path: of the map, see `save_map`.
     """
     scene = build_scene(replace(robot.config, obstacles=0, people=0), robot.scene.nominal, robot.profile, seed)
     mapper, floor, t = VoxelGridMapper(), FloorPlane(), 0.0

@@ -36,7 +36,6 @@ class TrueMasks:
     latency = 0.02
 
     def __init__(self) -> None:
-        """Look into the twin of the trial."""
         self._robot = AlteredTwin.newest()
         self._model = self._robot.scene.model
         self._data = mujoco.MjData(self._model)

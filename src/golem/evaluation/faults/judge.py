@@ -62,11 +62,7 @@ class FaultFinding:
 
 
 class Judge:
-    """Watches a rig from the begin of a fault on; a node that has the last turn of a tick.
-
-    Attributes:
-        finding: what it has seen.
-    """
+    """Watches a rig from the begin of a fault on; a node that has the last turn of a tick."""
 
     period = TICK
 

@@ -61,14 +61,9 @@ class LiveFaultsConfig:
 
 
 class LiveRobot:
-    """A launched robot, as a stranger sees it.
-
-    Attributes:
-        link: to it.
-    """
+    """A launched robot, as a stranger sees it."""
 
     def __init__(self, participant: CycloneParticipant, link: RobotLink, dds: DdsConfig) -> None:
-        """Look at the robot on the domain of `dds`."""
         self._participant, self.link, self._dds = participant, link, dds
 
     def kill(self, name: str, number: signal.Signals) -> None:
@@ -123,14 +118,7 @@ class LiveRobot:
 
 @dataclass(frozen=True)
 class LiveFault:
-    """One fault.
-
-    Attributes:
-        name: of it.
-        inject: does it.
-        reasons: what the gate may say.
-        restore: undoes it.
-    """
+    """One fault."""
 
     name: str
     inject: Callable[[LiveRobot], None]
@@ -211,7 +199,6 @@ def _active(robot: LiveRobot) -> bool:
 
 
 def _try(robot: LiveRobot, fault: LiveFault) -> bool:
-    """Inject one fault; return whether the gate gave a right reason."""
     if not robot.activate():
         log_line(f"{fault.name}: the robot did not become active again")
         return False

@@ -149,7 +149,6 @@ class FaultyRobot:
     period = TICK
 
     def __init__(self, rig: FaultRig) -> None:
-        """Spoil as the fault of `rig` says."""
         self._rig = rig
 
     def step(self, t: float) -> None:

@@ -156,11 +156,7 @@ class Request:
 
 
 class Runner:
-    """Runs one request into one folder.
-
-    Attributes:
-        records: what is kept so far.
-    """
+    """Runs one request into one folder."""
 
     def __init__(
         self, request: Request, provenance: Provenance, folder: RunFolder, executor: TrialExecutor, command: str

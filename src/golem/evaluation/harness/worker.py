@@ -64,7 +64,6 @@ class Watchdog:
 
 
 def _end() -> None:
-    """End this process and all that it started."""
     os.killpg(0, signal.SIGKILL)
 
 

@@ -141,8 +141,6 @@ _TURNED = 274, (5, 6, 7, 8)
 
 
 class _Row(NamedTuple):
-    """One annotation."""
-
     label: str
     box: tuple[float, float, float, float]
     ignored: bool

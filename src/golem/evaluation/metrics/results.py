@@ -175,6 +175,5 @@ def gate_hours(folder: Path) -> GateHours:
 
 
 def _paired(records: Sequence[TrialRecord]) -> bool:
-    """Return whether every method has the same trials."""
     keys = {m: {r.key[1:] for r in records if r.method == m} for m in {r.method for r in records}}
     return len({frozenset(k) for k in keys.values()}) == 1

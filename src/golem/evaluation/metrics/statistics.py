@@ -52,14 +52,7 @@ class Distribution:
 
 @dataclass(frozen=True, slots=True)
 class PairedTable:
-    """Counts of paired trials of two methods A and B.
-
-    Attributes:
-        both: both succeeded.
-        only_a: A succeeded and B did not.
-        only_b: B succeeded and A did not.
-        neither: both failed.
-    """
+    """Counts of paired trials of two methods A and B."""
 
     both: int
     only_a: int
@@ -79,13 +72,7 @@ class PairedTable:
 
 
 def wilson(successes: float, n: float, confidence: float = 0.95) -> Interval:
-    """Return the Wilson score interval of a success rate, without continuity correction.
-
-    Args:
-        successes: number of successes, 0 to n.
-        n: number of independent trials, > 0.
-        confidence: coverage, 0 to 1.
-    """
+    """Return the Wilson score interval of a success rate, without continuity correction."""
     z = NormalDist().inv_cdf(0.5 + confidence / 2)
     centre, z2 = successes + z * z / 2, z * z
     half = z * math.sqrt(successes * (n - successes) / n + z2 / 4)

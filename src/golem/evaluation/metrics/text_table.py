@@ -17,14 +17,7 @@ _FIGURE = re.compile(r"-|([<>=]+ )?[\[+-]*\d.*")
 
 @dataclass(frozen=True, slots=True)
 class TextTable:
-    """A table whose cells are words.
-
-    Attributes:
-        title: one line above it.
-        columns: heads.
-        rows: cells, as many as columns.
-        note: one sentence below it.
-    """
+    """A table whose cells are words."""
 
     title: str
     columns: tuple[str, ...]

@@ -143,12 +143,10 @@ def _action(d: Description) -> Iterator[Mistake]:
 
 
 def _mirrored(q: Array) -> bool:
-    """Return whether the posture `q` (12,) is the same for both legs."""
     return bool(np.allclose(q[:6], q[6:] * MIRROR, atol=ALIKE))
 
 
 def _alike(values: Array, by: float) -> bool:
-    """Return whether the values (12,) of both legs are alike."""
     return bool(np.abs(values[:6] - values[6:]).max() <= by)
 
 
@@ -180,10 +178,6 @@ class PassportReport:
 
 def check_passport(passport: Passport, progress: Callable[[str], None] = lambda said: None) -> PassportReport:
     """Check a policy; nothing moves but the twin.
-
-    Args:
-        passport: what is said of it.
-        progress: is told what is being done.
 
     Raises:
         ConfigError: there is no network, or none that can be run.

@@ -99,7 +99,6 @@ def _orders(d: Description) -> Iterator[Repair]:
 
 
 def _renamed(term: Term, now: dict[str, str]) -> Term:
-    """Return `term` with the joints that it shows renamed."""
     if not term.term.startswith(("joint", "last")):
         return term
     of = term.of or (_LEGS if term.term == "last_action" else JOINT_NAMES)
@@ -144,7 +143,6 @@ def _flipped(term: Term, joints: Sequence[str]) -> Term:
 
 
 def _names(term: Term) -> list[str]:
-    """Return the components that `term` shows."""
     return [name for _, name in ObservationLayout((replace(term, scale=1.0),), np.zeros(NUM_JOINTS)).components]
 
 

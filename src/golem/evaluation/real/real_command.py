@@ -161,12 +161,7 @@ def run_real(config: RealConfig) -> int:
 
 
 def predicted(row: RealRow, twin: Sequence[float]) -> Interval | None:
-    """Return what 95 % of real samples as large as the row's would show, were they of the twin; None: unknown.
-
-    Args:
-        row: a count, mean or median.
-        twin: its values in the twin's trials.
-    """
+    """Return what 95 % of real samples as large as the row's would show, were they of the twin; None: unknown."""
     from scipy.stats import betabinom
     from scipy.stats import t as student
 

@@ -71,7 +71,6 @@ class MiswiredTwin(MujocoRobot):
     """The twin, with a fault in what it reports; see `golem.robots.base.Robot`."""
 
     def __init__(self, profile: str, seed: int, posture: Array, config: MiswiredTwinConfig | None = None) -> None:
-        """Build it; see `MujocoRobot`."""
         wrong = config or MiswiredTwinConfig()
         super().__init__(profile, seed, posture, wrong)
         self._fault = wrong.fault

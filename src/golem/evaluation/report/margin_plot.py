@@ -82,12 +82,7 @@ LEAD = 1.0
 
 @dataclass(frozen=True, slots=True)
 class MarginCurve:
-    """One trial of a plot.
-
-    Attributes:
-        trace: its samples.
-        success: whether it succeeded; others end with a cross.
-    """
+    """One trial of a plot."""
 
     trace: BalanceTrace
     success: bool

@@ -102,7 +102,6 @@ def _page(studies: Sequence[Study], link: Any, files: dict[str, str], root: str 
 
 
 def _board(study: Study, cell: CellResult, link: Any) -> dict[str, Any]:
-    """Return a cell's methods, the best first."""
     first, short, rows = cell.records[0], short_names(cell.methods), list[dict[str, Any]]()
     for method in cell.methods:
         won = [r.success for r in cell.of(method)]
@@ -135,7 +134,6 @@ def _slug(cell: CellResult, method: str) -> str:
 
 
 def _method_page(study: Study, cell: CellResult, method: str, out: Path) -> None:
-    """Write the page of a method in a cell, and those of its trials."""
     folder, rows = out / study.name / cell.name, cell.of(method)
     name, back, cases = short_names(cell.methods)[method], f"{_slug(cell, method)}.html", dict[str, list[Any]]()
     for r in rows:

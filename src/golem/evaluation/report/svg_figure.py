@@ -120,13 +120,7 @@ Placed = tuple[Conditions, bool]
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """Trials of one value of a condition, or of one part of its range.
-
-    Attributes:
-        condition: its name.
-        name: the value, or the part's ends.
-        won, n: trials that succeeded, and all.
-    """
+    """Trials of one value of a condition, or of one part of its range."""
 
     condition: str
     name: str

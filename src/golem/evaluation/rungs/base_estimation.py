@@ -235,7 +235,6 @@ class BaseEstimation(Rung[BaseEstimationOptions]):
         return tuple(name for name in registry.names(SLOT) if name != "tether")
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
-        """Return what determines a trial besides its seed; see `Rung`."""
         walking = legs_stack(self.options.legs, profile, overrides)
         registry.load(SLOT, _choice(method).use)
         return {**stack_facts(walking), "method": stack_facts(walking.with_choice(SLOT, method))["user_files"]}
@@ -330,5 +329,4 @@ def _way(T: Array, first: int, last: int) -> Array:
 
 
 def _longest(flags: Array) -> int:
-    """Return the length of the longest run of true values."""
     return int(np.max(np.diff(true_runs(flags)), initial=0))

@@ -91,19 +91,16 @@ def judge_lidar(stack: Stack, seed: int, head: Calibration, method: str) -> Tria
 def _fitted(
     good: bool, method: str, words: str, series: Mapping[str, float], timings: Mapping[str, float] | None = None
 ) -> TrialOutcome:
-    """Return the outcome of a calibration that came to an end."""
     return TrialOutcome(
         good, DONE if good else "fit", None if good else f"skill: {method}", words, timings or {}, series
     )
 
 
 def _failed(result: SkillResult) -> TrialOutcome:
-    """Return the outcome of a calibration that did not."""
     return TrialOutcome(False, result.stage, result.slot, result.reason, result.timings)
 
 
 def _angle(T: Array) -> float:
-    """Return the angle by which the (4, 4) pose `T` turns [rad]."""
     return float(np.arccos(np.clip((np.trace(T[:3, :3]) - 1.0) / 2.0, -1.0, 1.0)))
 
 
@@ -153,11 +150,9 @@ class CalibrationRung(Rung[CalibrationOptions]):
     default_methods = (SKILL,)
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
-        """Return what determines a trial besides its seed; see `Rung`."""
         return stack_facts(tagged_stack(profile, overrides))
 
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
-        """Run one trial; see `Rung`."""
         stack = tagged_stack(spec.profile, spec.overrides)
         seed = episode_seed(spec.seed, spec.index)
         found = calibrate(stack, seed, self.options.views, self.options.keep)
@@ -189,7 +184,6 @@ class CalibratedTether(PickRung):
     Options = CalibratedPickOptions
 
     def __init__(self, options: CalibratedPickOptions | None = None) -> None:
-        """Read the sweep; see `Rung`."""
         super().__init__(options)
         self._how = options or CalibratedPickOptions()
         self._file: Path | None = None
@@ -217,14 +211,7 @@ class CalibratedTether(PickRung):
 
 
 def calibrate(stack: Stack, seed: int, views: int, keep: str = "") -> Calibration | SkillResult:
-    """Return the calibration of a twin that wears its tags, or how it failed.
-
-    Args:
-        stack: of that twin.
-        seed: of the episode.
-        views: postures of each hand.
-        keep: see `CalibrationOptions`.
-    """
+    """Return the calibration of a twin that wears its tags, or how it failed."""
     kept = Path(keep) / f"{stack.profile}-{views}-{seed}.json" if keep else None
     if kept is not None and kept.is_file():
         return read_calibration(kept)

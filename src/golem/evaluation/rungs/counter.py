@@ -71,9 +71,6 @@ class CounterRung(KitchenRung[CounterOptions]):
 
     It succeeds where such a thing was lifted by 5 cm, stands upright within 6 cm of the place, and nothing else has
     been moved by more than 5 cm or knocked over.
-
-    Attributes:
-        name: of the rung, and of the shipped stack it runs.
     """
 
     Options = CounterOptions
@@ -127,7 +124,6 @@ class CounterRung(KitchenRung[CounterOptions]):
         goal: TakeGoal,
         place: tuple[float, float],
     ) -> SkillResult:
-        """Take, then place, asked for in the robot's odom."""
         taken = running.execute("take", goal, watch=watch)
         if not taken.success:
             return taken

@@ -69,7 +69,6 @@ class FaultsRung(Rung[FaultOptions]):
     adaptive = True
 
     def __init__(self, options: FaultOptions | None = None) -> None:
-        """Check the names; see `Rung`."""
         super().__init__(options)
         for posture in self.options.posture:
             if posture not in POSTURES:
@@ -79,7 +78,6 @@ class FaultsRung(Rung[FaultOptions]):
             raise ConfigError(f"No fault has '{self.options.only}' in its name; golem faults --help lists none.")
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
-        """Return what determines a trial; see `Rung`."""
         return {posture: stack_facts(self.stack(posture, profile, overrides)) for posture in self.options.posture}
 
     def stack(self, posture: str, profile: str, overrides: Mapping[str, str]) -> Stack:
@@ -142,7 +140,6 @@ class FaultsRung(Rung[FaultOptions]):
 
 
 def _try(rig: FaultRig, spec: TrialSpec) -> TrialOutcome:
-    """Let one fault happen."""
     fault, posture = FAULTS[str(spec.case["fault"])], str(spec.case["posture"])
     judge = Judge(rig)
     rig.executor.add(judge)

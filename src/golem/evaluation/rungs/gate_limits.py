@@ -90,7 +90,6 @@ class GateLimits(PushedRung[GateLimitsOptions]):
     adaptive = True
 
     def __init__(self, options: GateLimitsOptions | None = None) -> None:
-        """Check what is to be lifted; see `Rung`."""
         super().__init__(options)
         self._each("level", "lift")
         for names in self.options.lift:

@@ -59,13 +59,7 @@ class Verdict:
 
 @dataclass(frozen=True, slots=True)
 class Errand:
-    """An errand that has ended.
-
-    Attributes:
-        result: how the robot says it ended.
-        watch: looked on.
-        judge: says what is so, once everything has come to rest.
-    """
+    """An errand that has ended."""
 
     result: SkillResult
     watch: ErrandWatch
@@ -104,13 +98,11 @@ class KitchenRung(Rung[O]):
         return stack
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
-        """Return what determines a trial besides its seed; see `Rung`."""
         stack = self.make_stack(method, profile, overrides)
         shared_context()
         return stack_facts(stack)
 
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
-        """Run one trial; see `Rung`."""
         stack = self.arranged(spec, self.make_stack(spec.method, spec.profile, spec.overrides))
         running, robot = build(stack, episode_seed(spec.seed, spec.index))
         if not isinstance(robot, MujocoRobot) or not self.suits(robot):

@@ -64,11 +64,9 @@ class LegRung(Rung[O]):
                 raise ConfigError(f"--{option} names nothing, or one of them twice.")
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
-        """Return what determines a trial besides its seed; see `Rung`."""
         return {**stack_facts(self.stack(method, profile, overrides)), **self.facts}
 
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
-        """Run one trial; see `Rung`."""
         with closing(self.episode(spec)) as episode:
             if self.walks and not can_walk(episode.running.envelope):
                 return no_walker(spec.method)

@@ -42,7 +42,6 @@ class MpcRate(LegRung[PlantOptions]):
     timed = True
 
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
-        """Run one trial; see `Rung`."""
         stack = self.stack(spec.method, spec.profile, spec.overrides)
         legs = stack.choice("lower_body")
         if legs.use != "mpc":

@@ -48,7 +48,6 @@ class HallWalk:
     """
 
     def __init__(self) -> None:
-        """Wait for the first step."""
         self.track: list[tuple[float, float]] = []
         self.stopped: PlanarPose | None = None
         self.recoveries = self.walkers = self.nobody = 0
@@ -147,11 +146,9 @@ class NavigateRung(Rung[NavigateOptions]):
     default_n = 20
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
-        """Return what determines a trial besides its seed; see `Rung`."""
         return {**stack_facts(self._stack(method, profile, overrides)), "distance": DISTANCE, "spread": SPREAD}
 
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
-        """Run one trial; see `Rung`."""
         stack = self._stack(spec.method, spec.profile, spec.overrides)
         seed, known = episode_seed(spec.seed, spec.index), spec.case["map"] == "survey"
         with TemporaryDirectory() as folder:
@@ -165,7 +162,6 @@ class NavigateRung(Rung[NavigateOptions]):
                 return self._walk(spec, episode, known)
 
     def _walk(self, spec: TrialSpec, episode: Episode, known: bool) -> TrialOutcome:
-        """Let the robot walk, and say what became of it."""
         off = spec.rng("start").uniform(-1.0, 1.0, 3) * SPREAD
         goal = PlanarPose(DISTANCE + float(off[0]), float(off[1]), float(off[2]))
         walked, contacts = HallWalk(), ContactWatch(episode.robot)
@@ -247,7 +243,6 @@ def judge(
 
 
 def _off(one: PlanarPose, other: PlanarPose) -> tuple[float, float]:
-    """Return where `other` is as seen from `one` [m]."""
     off = one.to(other)
     return off.x, off.y
 

@@ -53,7 +53,6 @@ class NavigateLine(LegRung[LineOptions]):
     facts = {"distance": DISTANCE, "tolerance": TOLERANCE}
 
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
-        """Run one trial; see `Rung`."""
         with closing(self.episode(spec)) as episode:
             if episode.running.envelope.vx[1] <= 0.0:
                 why = "It does not walk: the greatest forward speed in its envelope is zero."

@@ -171,7 +171,6 @@ class OdometryRung(Rung[OdometryOptions]):
         return tuple(name for name in registry.names(SLOT) if name != "topic")
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
-        """Return what determines a trial besides its seed; see `Rung`."""
         walking = legs_stack(self.options.legs, profile, overrides)
         _make(_choice(method))
         facts = stack_facts(walking.with_choice(SLOT, method))

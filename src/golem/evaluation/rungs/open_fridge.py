@@ -37,17 +37,12 @@ class FridgeOptions:
 
 
 class FridgeRung(KitchenRung[FridgeOptions]):
-    """One fridge per trial: its handle is seen, grasped, and pulled along its circle.
-
-    Attributes:
-        name: of the rung, and of the shipped stack it runs.
-    """
+    """One fridge per trial: its handle is seen, grasped, and pulled along its circle."""
 
     Options = FridgeOptions
     default_methods = ("centroid", "antipodal", "reranked")
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
-        """Return what determines a trial besides its seed; see `Rung`."""
         return {**super().config(method, profile, overrides), "goal": asdict(OpenGoal())}
 
     def errand(

@@ -220,18 +220,13 @@ def let_go(running: LockstepRunner, robot: MujocoRobot) -> TrialOutcome | None:
 
 
 class PickRung(Rung[PickOptions]):
-    """One screw per trial: seen, approached, grasped, pulled out, dropped in the tray.
-
-    Attributes:
-        name: of the rung, and of the shipped stack it runs.
-    """
+    """One screw per trial: seen, approached, grasped, pulled out, dropped in the tray."""
 
     Options = PickOptions
     default_methods = ("centroid", "visual_servo")
     slot = SLOT
 
     def __init__(self, options: PickOptions | None = None) -> None:
-        """Read the sweep; see `Rung`."""
         super().__init__(options)
         self._sweep = read_sweep(self.options.sweep)
 
@@ -240,7 +235,6 @@ class PickRung(Rung[PickOptions]):
         return self._sweep
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
-        """Return what determines a trial besides its seed; see `Rung`."""
         stack = self._stack(method, profile, overrides)
         if not issubclass(registry.load("robot", stack.choice("robot").use), MujocoRobot):
             raise ConfigError(
@@ -251,7 +245,6 @@ class PickRung(Rung[PickOptions]):
         return {**stack_facts(stack), "goal": asdict(self._goal)}
 
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
-        """Run one trial; see `Rung`."""
         stack = self._stack(spec.method, spec.profile, spec.overrides)
         if self.options.layout != "nominal" or spec.case:
             stack = stack.with_options("robot", layout=self.options.layout, conditions=dict(spec.case))

@@ -45,7 +45,6 @@ class PushRung(LegRung[PlantOptions]):
     facts: Mapping[str, object] = {"peak": PEAK, "settle": SETTLE, "patience": PATIENCE}
 
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
-        """Run one trial; see `Rung`."""
         push, settle = self.draw(spec.rng("push"))
         with closing(self.episode(spec)) as episode:
             episode.start(ScriptedMotion(ArmMotion(spec.rng("arms"))))

@@ -55,7 +55,6 @@ class PushLimit(PushedRung[PushLimitOptions]):
     adaptive = True
 
     def __init__(self, options: PushLimitOptions | None = None) -> None:
-        """Check the search; see `Rung`."""
         super().__init__(options)
         o = self.options
         for option, value in (("first", o.first), ("step", o.step)):
@@ -66,7 +65,6 @@ class PushLimit(PushedRung[PushLimitOptions]):
         self._each("terms")
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
-        """Return what determines a trial besides its seed; see `Rung`."""
         if "own" in self.options.terms:
             own_legs(method)
         return super().config(method, profile, overrides)

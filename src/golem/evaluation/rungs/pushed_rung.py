@@ -186,7 +186,6 @@ class PushedRung(LegRung[O]):
     run = Rung.run  # one alone is pushed as several are
 
     def __init__(self, options: O | None = None) -> None:
-        """Check the directions and phases; see `Rung`."""
         super().__init__(options)
         for name in self.options.direction:
             if name not in DIRECTIONS:
@@ -234,7 +233,6 @@ class PushedRung(LegRung[O]):
         return [in_a_copy(partial(self._push, episode, spec)) for spec in specs]
 
     def _push(self, episode: PushedEpisode, spec: TrialSpec) -> TrialOutcome:
-        """Push the robot and wait."""
         make = shove if self.options.kind == "shove" else rod
         push, standing = (
             make(str(spec.case["direction"]), float(spec.case["level"])),

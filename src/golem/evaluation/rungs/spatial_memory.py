@@ -193,7 +193,6 @@ class MemoryRung(Rung[Any]):
     default_profile = "ideal"
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
-        """Return what determines a trial besides its seed; see `Rung`."""
         return stack_facts(Stack(profile=profile).with_choice(SLOT, method))
 
     def together(self, spec: TrialSpec) -> Hashable:
@@ -293,8 +292,6 @@ def ask(method: str, episode: Relocation) -> TrialOutcome:
 
 
 class _Times:
-    """CPU times of looks and questions [s]."""
-
     def __init__(self) -> None:
         self.updates: list[float] = []
         self.queries: list[float] = []
@@ -317,7 +314,6 @@ def _timed(work: Callable[[], Any]) -> tuple[Any, float]:
 
 
 def _kinds(things: Sequence[Thing]) -> list[Thing]:
-    """Return one thing of each kind."""
     return list({thing.kind: thing for thing in reversed(things)}.values())
 
 

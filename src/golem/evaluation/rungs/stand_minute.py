@@ -30,7 +30,6 @@ class StandQuiet(LegRung[PlantOptions]):
     settle = CALM
 
     def trial(self, spec: TrialSpec, episode: Episode) -> TrialOutcome:
-        """Run one trial; see `LegRung`."""
         episode.stand(self.settle)
         start = episode.t
         episode.run(MINUTE)
@@ -50,7 +49,6 @@ class StandArms(StandQuiet):
     settle = SETTLE
 
     def trial(self, spec: TrialSpec, episode: Episode) -> TrialOutcome:
-        """Run one trial; see `LegRung`."""
         episode.start(ScriptedMotion(ArmMotion(spec.rng("arms"), WIDE_AREA)))
         return super().trial(spec, episode)
 

@@ -55,13 +55,11 @@ class Tour(LegRung[TourOptions]):
     default_profile = "bench"
 
     def __init__(self, options: TourOptions | None = None) -> None:
-        """Check what was asked for; see `Rung`."""
         super().__init__(options)
         self._each("engine")
         lifted(SafetyLimits.from_profile(), self.options.lift)
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
-        """Return what determines a trial besides its seed; see `Rung`."""
         if "robot" in overrides:
             raise ConfigError("The rung tour has its engines by --engine; leave out --use robot=...")
         stacks = {e: self.stack(method, profile, {**overrides, "robot": e}) for e in self.options.engine}
@@ -76,7 +74,6 @@ class Tour(LegRung[TourOptions]):
         return lifted(SafetyLimits.from_profile(stack.limits), self.options.lift)
 
     def trial(self, spec: TrialSpec, episode: Episode) -> TrialOutcome:
-        """Run one trial; see `LegRung`."""
         robot = episode.robot
         model, data = robot.scene.model, robot.data
         mass = float(model.body_subtreemass[model.body(BASE_LINK).id])

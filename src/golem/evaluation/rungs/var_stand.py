@@ -103,11 +103,9 @@ class VarStandRung(PickRung):
 
     @property
     def balances(self) -> bool:
-        """Whether the robot stands on its own feet."""
         return True
 
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
-        """Run one trial; see `Rung`."""
         seed, walks = episode_seed(spec.seed, spec.index), spec.case["start"] == "walked"
         stance = drawn_stance(spec, walks)
         conditions = dict(_conditions(spec.case))
@@ -148,11 +146,7 @@ class VarStandRung(PickRung):
 
 
 class _Trial:
-    """One trial on its way.
-
-    Attributes:
-        recorder: of the balance from the pick on; None before it.
-    """
+    """One trial on its way."""
 
     def __init__(self, spec: TrialSpec, stack: Stack, episode: Episode, stance: PlanarPose, label: str) -> None:
         self._spec, self._stack, self._episode, self._stance = spec, stack, episode, stance
@@ -202,7 +196,6 @@ class _Trial:
         return self._episode.result is not None
 
     def _pick(self) -> TrialOutcome:
-        """Dock, if it is to, pick, and judge."""
         running, robot = self._episode.running, self._episode.robot
         oracle, before = self._oracle, self._oracle.fasteners()
         touches = PickTouches(robot, before, oracle.T_world_odom)
@@ -262,7 +255,6 @@ class _Trial:
         return self._name("mapper" if drift > 0.5 * off else "navigator")
 
     def _placed(self, when: str) -> dict[str, float]:
-        """Return where the robot stands as seen from the nominal stance."""
         off = self._stance.to(self._episode.robot.truth.pose())
         return {
             f"{when}_x": off.x,
@@ -297,5 +289,4 @@ def drawn_stance(spec: TrialSpec, walks: bool) -> PlanarPose:
 
 
 def _at(T: Array, place: Array) -> Array:
-    """Return a point (3,) in the frame to which `T` (4, 4) leads."""
     return T[:3, :3] @ place + T[:3, 3]

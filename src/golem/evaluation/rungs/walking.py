@@ -64,7 +64,6 @@ class WalkRough(LegRung[WalkRoughOptions]):
     walks = True
 
     def __init__(self, options: WalkRoughOptions | None = None) -> None:
-        """Check the grounds; see `Rung`."""
         super().__init__(options)
         self._each("ground")
         for ground in self.options.ground:
@@ -72,7 +71,6 @@ class WalkRough(LegRung[WalkRoughOptions]):
                 raise unknown_name("ground", ground, GROUNDS)
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
-        """Return what determines a trial besides its seed; see `Rung`."""
         grounds = self.options.ground
         return {g: stack_facts(self.stack(method, profile, overrides, GROUNDS[g])) for g in grounds}
 
@@ -81,7 +79,6 @@ class WalkRough(LegRung[WalkRoughOptions]):
         return self.stack(spec.method, spec.profile, spec.overrides, GROUNDS[str(spec.case["ground"])])
 
     def trial(self, spec: TrialSpec, episode: Episode) -> TrialOutcome:
-        """Run one trial; see `LegRung`."""
         motion = ScriptedMotion(ArmMotion(spec.rng("arms")) if self.options.arms else None)
         episode.start(motion)
         episode.stand(SETTLE)
@@ -122,7 +119,6 @@ class WalkEndurance(LegRung[EnduranceOptions]):
     default_profile = "bench"
 
     def trial(self, spec: TrialSpec, episode: Episode) -> TrialOutcome:
-        """Run one trial; see `LegRung`."""
         envelope = episode.running.envelope
         if not can_walk(envelope) and envelope.height is None:
             return no_walker(spec.method)
@@ -175,7 +171,6 @@ class WalkStop(LegRung[PlantOptions]):
     walks = True
 
     def trial(self, spec: TrialSpec, episode: Episode) -> TrialOutcome:
-        """Run one trial; see `LegRung`."""
         goal, noise = draw(spec.rng("goal")), spec.rng("odometry")
         episode.locate(SimulatedOdometry(episode.running.bus, episode.robot, "estimator", noise))
         episode.stand(SETTLE)
@@ -214,7 +209,6 @@ class WalkTwist(LegRung[PlantOptions]):
     walks = True
 
     def trial(self, spec: TrialSpec, episode: Episode) -> TrialOutcome:
-        """Run one trial; see `LegRung`."""
         twist = command(episode.running.envelope, spec.rng("twist"), spec.index)
         episode.stand(SETTLE)
         episode.start(ScriptedMotion(twist=lambda t: twist))

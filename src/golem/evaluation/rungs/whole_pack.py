@@ -87,7 +87,6 @@ class WholePackRung(VarStandRung):
 
     @property
     def _goal(self) -> PickGoal:
-        """Of each pick: either hand."""
         return PickGoal(side="either")
 
     def cases(self, results: Results) -> Sequence[Case]:
@@ -95,7 +94,6 @@ class WholePackRung(VarStandRung):
         return self._sweep
 
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
-        """Run one trial; see `Rung`."""
         stack = self._stack(spec.method, spec.profile, spec.overrides).with_options(
             "robot", layout=self.options.layout, conditions=dict(spec.case), stance=[AWAY, 0.0, 0.0],
             world=self.options.world, obstacles=0, reach_y=REACH_Y, gantry=self.options.gantry,

@@ -45,25 +45,14 @@ UPRIGHT = np.deg2rad(45.0)
 
 @dataclass(frozen=True, slots=True)
 class Query:
-    """What a planner is asked.
-
-    Attributes:
-        request: the request.
-        kind: from where to where.
-    """
+    """What a planner is asked."""
 
     request: PlanRequest
     kind: str
 
 
 def queries(robot: PlanningRobot, n: int, seed: int) -> Iterator[Query]:
-    """Yield `n` queries whose start is free and that have a free goal posture; what else is drawn is left out.
-
-    Args:
-        robot: who is asked.
-        n: how many.
-        seed: the same draws the same.
-    """
+    """Yield `n` queries whose start is free and that have a free goal posture; what else is drawn is left out."""
     finder, rng, count = GoalPostures(), np.random.default_rng(seed), 0
     while count < n:
         layout = arranged(PackLayout(), draw_conditions("varied", {}, rng))

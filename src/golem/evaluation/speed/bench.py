@@ -212,7 +212,6 @@ def _perception(config: BenchConfig) -> list[Figure]:
 
 
 def _navigation(config: BenchConfig) -> list[Figure]:
-    """Return what mapping and navigation cost."""
     rows = navigation_times(timed, 10 if config.quick else 60)
     return [figure(name, times, 1e3, "ms", reference) for name, times, reference in rows]
 

@@ -191,7 +191,6 @@ def _start(steps: dict[str, float]) -> Table:
 
 
 def _spread(values: Iterable[float], unit: str = "") -> str:
-    """Return median and range in words."""
     these: Sequence[float] = list(values)
     return f"{statistics.median(these):.3g}{unit} ({min(these):.3g} - {max(these):.3g})"
 

@@ -53,7 +53,6 @@ def navigation_times(timed: Timed, n: int) -> list[tuple[str, Array, str]]:
 
 
 def _scans(count: int) -> list[Scan]:
-    """Return scans of a room, each from the same place."""
     walk, rng, found = MadeWalk(ROOM, still=1e3, every=1), np.random.default_rng(1), list[Scan]()
     T, floor = walk.T_base_lidar, np.array([0.0, 0.0, -HEIGHT])
     for i in range(1, count + 1):

@@ -112,7 +112,6 @@ def read_study_file(path: Path) -> tuple[StudyFile, tuple[Cell, ...]]:
 
 
 def _expand(study: StudyFile, entry: StudyEntry) -> list[Cell]:
-    """Return the cells of an entry."""
     defaults = {"profile": study.profile, "seed": study.seed}
     values = [_several(defaults.get(name) if (given := getattr(entry, name)) is None else given) for name in AXES]
     found: list[Cell] = []

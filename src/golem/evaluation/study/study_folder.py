@@ -25,13 +25,7 @@ EMPTY = "-"
 
 @dataclass(frozen=True, slots=True)
 class CellResult:
-    """What a cell holds.
-
-    Attributes:
-        name, folder: of the cell.
-        planned: trials per method and case that were planned.
-        records: its trials, at least one.
-    """
+    """What a cell holds."""
 
     name: str
     folder: Path

@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 import tyro
 from numpy.typing import NDArray
+from tyro.conf import OmitArgPrefixes
 
 from golem.errors import ConfigError
 from golem.evaluation.metrics.coco import LabelledImage
@@ -19,7 +20,7 @@ from golem.robots.sensors.streams import stream
 from golem.training.detector import dataset
 from golem.training.detector.dataset import Dataset
 from golem.training.detector.labels import CLASSES, KITCHEN, MIN_SIDE, PACK
-from golem.training.detector.train_detector import TrainDetectorConfig
+from golem.training.detector.train_detector import RUNS, TrainDetectorConfig
 from golem.training.detector.train_detector import train as run_training
 from golem.types import Array, Detection
 
@@ -86,9 +87,6 @@ def _scaled(image: LabelledImage, classes: tuple[str, ...], width: int) -> tuple
     return pixels, np.column_stack([kinds, middle, boxes, ignored.astype(float)]).reshape(-1, 8)[known]
 
 
-RUNS = Path("runs/detector")
-
-
 def render(
     folder: Path = RUNS / "data",
     seed: int = 0,
@@ -116,34 +114,8 @@ def render(
     dataset.generate(folder, seed, "train", {"pack": worlds, "kitchen": kitchens}, per_camera, jobs)
 
 
-def train(
-    data: Path = RUNS / "data",
-    out: Path = RUNS / "run",
-    seed: int = 0,
-    steps: int = 12000,
-    batch: int = 32,
-    rate: float = 2.5e-3,
-    check_every: int = 1000,
-    start: Path | None = None,
-    device: str = "cpu",
-) -> None:
-    """Train on the rendered splits, or resume.
-
-    Args:
-        data: folder of the splits.
-        out: folder of checkpoints and curve.
-        seed: of weights and crops.
-        steps: gradient steps.
-        batch: crops of a step.
-        rate: peak learning rate.
-        check_every: steps between evaluations on images that are set apart.
-        start: ONNX file of an earlier detector to begin with.
-        device: cpu, or cuda.
-    """
-    config = TrainDetectorConfig(
-        data, out, seed, steps, batch, rate, check_every=check_every, check_images=240, start=start,
-        device=device,
-    )  # fmt: skip
+def train(config: OmitArgPrefixes[TrainDetectorConfig]) -> None:
+    """Train on the rendered splits, or resume."""
     print(run_training(config))
 
 
@@ -239,8 +211,9 @@ def own(
     shipped = resources.files("golem.capabilities.perception").joinpath(SHIPPED)
     with resources.as_file(shipped) as default:
         config = TrainDetectorConfig(
-            labels, out, seed, steps, check_every=min(250, steps), start=start or default, classes=classes
-        )
+            labels, out, seed, steps, 8, check_every=min(250, steps), check_images=80, start=start or default,
+            classes=classes,
+        )  # fmt: skip
         best = fit(config, data)
     path = export_onnx(best, out / "detector.onnx")
     detector = OnnxDetector(OnnxDetectorConfig(str(path), THRESHOLD, {}))

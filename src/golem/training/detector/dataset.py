@@ -37,14 +37,9 @@ GONE = 0.15
 
 
 class RandomKitchen(RandomScene):
-    """A compiled random kitchen.
-
-    Attributes:
-        layout: where fridge and counter stand.
-    """
+    """A compiled random kitchen."""
 
     def __init__(self, world: Compiled, layout: KitchenLayout, parts: tuple[PackPart, ...]) -> None:
-        """Keep what was compiled."""
         super().__init__(world, parts)
         self.layout = layout
 
@@ -229,16 +224,7 @@ def named(conditions: Conditions) -> list[str]:
 
 
 def generate(folder: Path, seed: int, split: str, worlds: dict[str, int], per_camera: int, jobs: int = 1) -> None:
-    """Render a split into `folder/split`; worlds already there are kept.
-
-    Args:
-        folder: where the splits live.
-        seed: see `render`.
-        split: see `render`.
-        worlds: number of compiled worlds, by kind.
-        per_camera: see `render`.
-        jobs: processes that render.
-    """
+    """Render a split into `folder/split`; worlds already there are kept."""
     target = folder / split
     target.mkdir(parents=True, exist_ok=True)
     # Kinds take turns, so that a split that was stopped has its share of each.

@@ -28,16 +28,9 @@ CLUTTER = 6
 
 
 class RandomPack(RandomScene):
-    """A compiled random pack.
-
-    Attributes:
-        layout: where the pack stands.
-        tray: name of the tray's body.
-        draws: its loosened screws.
-    """
+    """A compiled random pack."""
 
     def __init__(self, world: Compiled, layout: PackLayout, names: PackNames, draws: tuple[ScrewDraw, ...]) -> None:
-        """Keep what was compiled."""
         pairs = zip(draws, names.mouths, strict=True)
         bores = tuple(Bore(mouth, draw.bore_radius, draw.name) for draw, mouth in pairs)
         tops = {draw.name: draw.head_height for draw in draws}
@@ -126,7 +119,6 @@ class RandomPack(RandomScene):
         return info
 
     def _hold(self, held: ScrewDraw, side: Side, rng: np.random.Generator) -> None:
-        """Put a screw between the fingers."""
         model, data = self.model, self.data
         site = model.site(f"{side}_gripper").id
         R_grip: Array = data.site_xmat[site].reshape(3, 3)

@@ -80,7 +80,6 @@ class RandomScene(ABC):
         bores: tuple[Bore, ...] = (),
         screw_tops: dict[str, float] | None = None,
     ) -> None:
-        """Keep what was compiled."""
         self.world, self.parts, self.bores = world, parts, bores
         self.screw_tops = screw_tops or {}
 

@@ -35,11 +35,6 @@ def load_onnx(model: PartNet, path: Path, classes: Sequence[str]) -> None:
     The normalisation is folded into the convolutions there: here it begins with mean 0 and variance 1. Classes that
     the file does not know keep their random weights; its classes that the network lacks are left out.
 
-    Args:
-        model: the network.
-        path: the ONNX file.
-        classes: what the heatmaps of `model` are.
-
     Raises:
         ValueError: the file is no such detector.
     """
@@ -154,6 +149,9 @@ def targets(labels: Sequence[Array], classes: int, device: str) -> tuple[Tensor,
     return heat, weight, torch.where(best >= 0.0, regression, 0.0)
 
 
+RUNS = Path("runs/detector")
+
+
 @dataclass(frozen=True, slots=True)
 class TrainDetectorConfig:
     """How to train.
@@ -173,14 +171,14 @@ class TrainDetectorConfig:
         device: where the network is trained, as PyTorch names it.
     """
 
-    data: Path
-    out: Path
+    data: Path = RUNS / "data"
+    out: Path = RUNS / "run"
     seed: int = 0
     steps: int = 12000
-    batch: int = 8
+    batch: int = 32
     rate: float = 2.5e-3
-    check_every: int = 500
-    check_images: int = 80
+    check_every: int = 1000
+    check_images: int = 240
     start: Path | None = None
     classes: tuple[str, ...] = CLASSES
     bfloat16: bool = True

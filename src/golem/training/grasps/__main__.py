@@ -32,10 +32,6 @@ LINES = {
 def draw_curve(curve: Path, out: Path) -> None:
     """Draw the area under the ROC curve over epochs.
 
-    Args:
-        curve: the CSV file that `train` writes.
-        out: the PNG file.
-
     Raises:
         MissingExtra: matplotlib is not installed.
     """

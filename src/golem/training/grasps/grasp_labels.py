@@ -113,7 +113,6 @@ class GraspTrial:
 
 
 def _line(start: Array, end: Array, seconds: float) -> Iterable[Array]:
-    """Yield poses that go smoothly from one place to another."""
     for s in np.linspace(0.0, 1.0, round(seconds / ware_scene.STEP)):
         T = end.copy()
         T[:3, 3] += (1.0 - s * s * (3.0 - 2.0 * s)) * (start - end)[:3, 3]
@@ -121,7 +120,6 @@ def _line(start: Array, end: Array, seconds: float) -> Iterable[Array]:
 
 
 def _still(T: Array, seconds: float) -> Iterable[Array]:
-    """Yield the same pose."""
     for _ in range(round(seconds / ware_scene.STEP)):
         yield T
 

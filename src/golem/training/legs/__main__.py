@@ -11,43 +11,15 @@ from rich.table import Table
 from tyro.conf import arg
 
 from golem.training.legs.checkpoint import CHECKPOINT
-from golem.training.legs.env import Task
 from golem.training.legs.learning_curve import draw_curves
-from golem.training.legs.train_legs import Adversary, Device, TrainLegsConfig
+from golem.training.legs.train_legs import TrainLegsConfig
 from golem.training.legs.train_legs import train as run_training
 
 RUNS = Path("runs/legs")
 
 
-def run(
-    out: Path = RUNS / "seed0",
-    seed: int = 0,
-    task: Task = "walk",
-    steps: float = TrainLegsConfig.steps,
-    adversary: Adversary = "learned",
-    robots: int = 512,
-    shards: int = 1,
-    device: Device = "auto",
-    seconds: float = float("inf"),
-    start: Path | None = None,
-) -> None:
-    """Train a leg policy, or go on where a run was stopped.
-
-    Args:
-        out: folder of checkpoint and curve.
-        seed: of weights, episodes and noise.
-        task: what is learned: to walk as told, on even or on rough ground, or to stand against pushes.
-        steps: actions of all robots together, those of `start` included.
-        adversary: who works against the legs through arms, waist and payloads: none, motions (a curriculum), or learned
-            (motions, then a policy as well).
-        robots: how many are simulated at once.
-        shards: processes that simulate them: one per core is fastest. With another number the draws are others.
-        device: of the networks; auto is a GPU where PyTorch finds one, else the CPU.
-        seconds: of wall clock after which it is interrupted; the same command goes on.
-        start: checkpoint of another run to go on from, under this command's options; or an exported network, at
-            full difficulty from its first step on.
-    """
-    config = TrainLegsConfig(out, seed, task, steps, robots, shards, device, seconds, adversary, start=start)
+def run(config: Annotated[TrainLegsConfig, arg(name="")]) -> None:
+    """Train a leg policy, or go on where a run was stopped."""
     print(run_training(config))
 
 

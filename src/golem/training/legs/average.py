@@ -51,6 +51,5 @@ def average(networks: Sequence[Path], weights: Sequence[float], out: Path) -> No
 
 
 def _trained(network: Path) -> str:
-    """Return what the network says trained it."""
     said = {prop.key: prop.value for prop in onnx.load(str(network)).metadata_props}
     return said.get(TRAINED, "unknown")

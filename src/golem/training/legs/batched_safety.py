@@ -28,7 +28,6 @@ class LegGate:
     """
 
     def __init__(self, n: int) -> None:
-        """Start with legs at rest in the stance."""
         limits = SafetyLimits.from_profile()
         self._velocity, self._torque = limits.velocity[LEGS], limits.torque[LEGS]
         self._lower, self._upper = limits.state_lower[LEGS], limits.state_upper[LEGS]

@@ -56,7 +56,6 @@ class UpperBodyMotion:
     """
 
     def __init__(self, n: int, rng: np.random.Generator) -> None:
-        """Begin at the home posture."""
         limits = load_limits()
         middle = 0.5 * (limits.lower + limits.upper)[UPPER]
         half = 0.45 * (limits.upper - limits.lower)[UPPER]  # the gate's middle 90 %

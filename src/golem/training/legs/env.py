@@ -191,7 +191,6 @@ class LegsEnv:
     """
 
     def __init__(self, n: int, config: EnvConfig, seed: int | tuple[int, ...], threads: int) -> None:
-        """Build the world and start every robot."""
         self.n, self.config = n, config
         self._rng = np.random.default_rng(seed)
         self.world = BatchWorld(n, config.world, self._rng, threads)

@@ -110,7 +110,6 @@ class ShardedEnv:
         self._hear()
 
     def _hear(self) -> None:
-        """Wait for every shard."""
         heard = list[tuple[dict[str, float], float]]()
         for k, (link, process) in enumerate(zip(self._links, self._processes, strict=True)):
             try:

@@ -44,12 +44,12 @@ class TrainLegsConfig:
     Attributes:
         out: folder of checkpoint and curve; a run whose folder holds a checkpoint goes on from it.
         seed: of weights, episodes and noise.
-        task: what is learned.
-        steps: actions of all robots together, e.g. 38e6.
+        task: what is learned: to walk as told, on even or on rough ground, or to stand against pushes.
+        steps: actions of all robots together, those of `start` included.
         robots: how many are simulated at once.
-        shards: processes that simulate them, each with draws of its own.
-        device: of networks and experience.
-        seconds: after which the run is interrupted, its checkpoint written.
+        shards: processes that simulate them, each with draws of its own: one per core is fastest.
+        device: of networks and experience; auto is a GPU where PyTorch finds one, else the CPU.
+        seconds: of wall clock after which the run is interrupted, its checkpoint written.
         start: what this run begins with, exploring with `noise` or, from an exported one,
             with `EXPORTED_NOISE`: networks and steps of another run's checkpoint, or a
             network that was exported. A run from an exported network counts its steps from none, is at full difficulty
@@ -288,7 +288,6 @@ class _Run:
         difficulty.amplitude = difficulty.speed = difficulty.payload = motion
 
     def _write(self) -> None:
-        """Append what was logged to the curve, and print the newest row."""
         if not self._log:
             return
         path = self.config.out / CURVE
@@ -305,8 +304,6 @@ class _Run:
 
 
 class _Meter:
-    """Sums over one update."""
-
     def __init__(self, episode: float) -> None:
         self._episode = episode
         self.finished, self.lasted = 0, 0.0
