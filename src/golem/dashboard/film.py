@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import math
 import os
+import queue
 import tempfile
+import threading
 from dataclasses import replace
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -47,6 +50,9 @@ WEBP_FRAMES = 240
 """A film with more pictures than this leaves some out there."""
 CHART = (230, 64)
 """Size of the chart of the CoM margin in a film of 540 lines [px]."""
+LIVE = (640, 360)
+"""Size of the pictures of a film of the live view [px]: each is rendered while the robot waits."""
+FILMS = Path("runs/live")
 PANEL = (16, 20, 27)
 INK, MUTED, ACCENT = (240, 242, 245), (150, 160, 173), (255, 196, 0)
 SAFETY_COLOURS = {
@@ -229,6 +235,38 @@ class Film:
     def close(self) -> None:
         """Release the renderer."""
         self._view.close()
+
+
+class LiveFilm:
+    """A film that is begun and ended while the robot is watched; it is written beside the robot, which goes on."""
+
+    def __init__(self) -> None:
+        """Start without one."""
+        self._film: Film | None = None
+        self._said: queue.SimpleQueue[str] = queue.SimpleQueue()
+
+    def toggle(self, robot: MujocoRobot, recorder: BalanceRecorder) -> bool:
+        """Begin a film, or end the one that was begun; return whether one is being taken."""
+        film, self._film = self._film, None
+        if film is None:
+            self._film = Film(robot, LIVE, recorder=recorder)
+        else:
+            film.close()
+            path = FILMS / f"{datetime.now():%Y%m%d-%H%M%S}.webp"
+            threading.Thread(target=self._write, args=(film, path), daemon=True).start()
+        return self._film is not None
+
+    def tick(self, running: LockstepRunner) -> str:
+        """Take a picture if one is due; return where a film was written, or why not, once, else nothing."""
+        if self._film is not None:
+            self._film.tick(running)
+        return "" if self._said.empty() else self._said.get_nowait()
+
+    def _write(self, film: Film, path: Path) -> None:
+        try:
+            self._said.put("Written: " + ", ".join(str(one) for one in film.save(path)))
+        except OutputError as error:
+            self._said.put(str(error))
 
 
 def _resized(picture: NDArray[Any], size: tuple[int, int]) -> NDArray[np.uint8]:

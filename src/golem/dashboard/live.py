@@ -18,10 +18,12 @@ import cv2
 import numpy as np
 
 from golem.dashboard.balance_chart import SPAN, balance_chart
+from golem.dashboard.film import LiveFilm
+from golem.dashboard.history import History, Snapshot, read_signals
 from golem.dashboard.map_view import map_view
 from golem.dashboard.panel import Button, Panel
 from golem.dashboard.server import Stage, serve
-from golem.dashboard.status import Timeline, camera_picture, read_status
+from golem.dashboard.status import Timeline, camera_picture, clouds, read_status
 from golem.errors import GolemError
 from golem.hardware.safety.base import OperatorRequest
 from golem.interfaces import topics
@@ -36,7 +38,7 @@ from golem.runtime.executor import FOREVER
 from golem.runtime.lockstep import LockstepRunner
 from golem.skills.base import Routine, SkillResult
 from golem.skills.context import Context
-from golem.types import TICK, Twist
+from golem.types import SIDES, TICK, UPPER, Twist
 
 if TYPE_CHECKING:
     import viser
@@ -103,12 +105,15 @@ class LiveView(AbstractContextManager["LiveView", None]):
         standing = running.stack.on_ground
         first = "pick" if robot.scene.names.screws else "walk"
         self._skills = running.skills
-        self._panel = Panel(self._server, self._skills.specs, first, standing=standing, restarts=restarts)
         self._view = SpectatorView(robot)
+        self._panel = Panel(
+            self._server, self._view.from_odom, self._skills.specs, first, standing=standing, restarts=restarts
+        )
         self._stage = Stage(self._server, self._view, standing=standing)
         self._paused = self._busy = self._restart = False
-        self._wanted: tuple[str, Any] | None = None
+        self._wanted: tuple[str | Routine[Context, Any], Any] | None = None
         self._note = ""
+        self._film = LiveFilm()
         self.decide: Callable[[bool], None] = lambda yes: None
         self._next_camera = 0.0
         self._factor = 1.0
@@ -141,7 +146,8 @@ class LiveView(AbstractContextManager["LiveView", None]):
         self._asking = False
         self._ended = self._next_update = self._shown = 0.0
         self._note = ""
-        self._origin = time.perf_counter() - running.executor.t
+        self._history = History()
+        self._speed, self._start = 1.0, (time.perf_counter(), running.executor.t)
         self._pace: tuple[float, float] = (time.perf_counter(), running.executor.t)
 
     @property
@@ -184,8 +190,11 @@ class LiveView(AbstractContextManager["LiveView", None]):
         end = self._running.executor.t + patience
         self.idle(lambda: bool(self._server.get_clients()) or self._running.executor.t >= end)
 
-    def wait_for_skill(self) -> tuple[str, Any] | None:
-        """Let time pass until the operator starts a skill; return its name and goal, or None for starting over."""
+    def wait_for_skill(self) -> tuple[str | Routine[Context, Any], Any] | None:
+        """Let time pass until the operator starts a skill or moves the arms; return it and its goal.
+
+        None is for starting over.
+        """
         self.idle(lambda: self._wanted is not None or self._restart)
         wanted, self._wanted = self._wanted, None
         self._restart = False
@@ -215,20 +224,27 @@ class LiveView(AbstractContextManager["LiveView", None]):
                 time.sleep(PERIOD)
                 self._serve_buttons()
                 self.update()
-                self._origin = time.perf_counter() - t
+                self._start = (time.perf_counter(), t)
             self._wait(t)
 
     def _wait(self, t: float) -> None:
-        ahead = t + self._origin - time.perf_counter()
+        """Let wall time pass until it is as late as robot time at the speed that is asked for."""
+        now, speed = time.perf_counter(), self._panel.view.speed
+        if speed != self._speed:
+            self._speed, self._start = speed, (now, t)
+        ahead = self._start[0] + (t - self._start[1]) / speed - now
         if ahead > 0.0:
             time.sleep(ahead)
         elif ahead < -LAG:
-            self._origin += -ahead - LAG
+            self._start = (now - LAG, t)
 
     def update(self) -> None:
         """Show the present moment, if anybody is looking."""
         self._timeline.update(self._running)
         now, t = time.perf_counter(), self._running.executor.t
+        signals = read_signals(self._running.bus, float(self._recorder.trace(last=PERIOD).margin[-1]))
+        self._history.add(Snapshot(t, *self._view.poses(), signals))
+        self._note = self._film.tick(self._running) or self._note
         if now - self._pace[0] > 2.0:
             self._factor = (t - self._pace[1]) / (now - self._pace[0])
             self._pace = (now, t)
@@ -236,9 +252,15 @@ class LiveView(AbstractContextManager["LiveView", None]):
             return
         if self._recorder.fallen and not self._note:
             self._note = "The robot fell, by the simulator's truth."
-        status = read_status(self._running)
+        status, shown = read_status(self._running), self._panel.view
+        past = self._history.before(shown.age) if shown.age else None
         with self._server.atomic():
-            self._stage.show(t - self._shown, self._timeline.target if self._busy else None)
+            self._stage.show(
+                t - self._shown,
+                self._timeline.target if self._busy else None,
+                None if past is None else (past.positions, past.orientations),
+                follow=shown.follows,
+            )
             self._show_push(t)
         self._shown = t
         self._panel.show_status(
@@ -255,6 +277,12 @@ class LiveView(AbstractContextManager["LiveView", None]):
             self._show_pictures()
 
     def _show_pictures(self) -> None:
+        bus, view = self._running.bus, self._panel.view
+        self._stage.show_layers(view.layers, clouds(bus) if "clouds" in view.layers else ())
+        state = bus.latest(topics.LOW_STATE)
+        view.plot(self._history)
+        if state is not None:
+            self._panel.arms.show(state.q[UPPER], {side: self._running.commanded(side) for side in SIDES})
         if self._panel.legs is not None:
             chart = balance_chart(self._recorder.trace(), CHART)
             if chart is not None:
@@ -306,6 +334,10 @@ class LiveView(AbstractContextManager["LiveView", None]):
                 self._running.cancel()
             elif button in (Button.ALLOW, Button.DENY):
                 self.decide(button is Button.ALLOW)
+            elif button is Button.MOVE:
+                self._move()
+            elif button is Button.RECORD:
+                self._panel.view.recording(self._film.toggle(self._robot, self._recorder))
             elif button is Button.RESTART:
                 self._restart = not self._busy
             elif button is Button.STAND and self._panel.legs is not None:
@@ -323,6 +355,14 @@ class LiveView(AbstractContextManager["LiveView", None]):
             self._wanted = None if self._running.busy else (name, self._skills.goal(name, fields))
         except GolemError as error:
             self._note = str(error)
+
+    def _move(self) -> None:
+        """Take up what sliders or gizmos of the arms say."""
+        arms = self._panel.arms
+        self._note = "" if arms.chosen else "Turn a slider or drag a gizmo first."
+        if arms.chosen and not self._running.busy:
+            self._wanted = arms.chosen, None
+            arms.forget()
 
     def _revive(self) -> None:
         """Reset the gate, and activate it as soon as that has armed it, or taken the reason from legs that stand."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import queue
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from enum import StrEnum
 from html import escape
 from typing import TYPE_CHECKING, Any
@@ -12,10 +12,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from golem.dashboard.arm_panel import ArmPanel
 from golem.dashboard.legs_panel import LegsPanel, legs_html
 from golem.dashboard.status import Status
+from golem.dashboard.view_panel import ViewPanel
 from golem.interfaces.payloads import GateState
 from golem.skills.spec import Schema, SkillSpec
+from golem.types import Array
 
 if TYPE_CHECKING:
     import viser
@@ -115,6 +118,7 @@ SAFETY_COLOURS = {
     GateState.STOP1: "#d0432f",
     GateState.STOP0: "#d0432f",
 }
+SMALL = "font-size:12px;opacity:.75"
 RECENT = 9
 """Stages listed in the timeline."""
 
@@ -144,6 +148,8 @@ class Button(StrEnum):
     PUSH = "push the robot"
     ALLOW = "allow what is asked"
     DENY = "deny what is asked"
+    MOVE = "move the arms"
+    RECORD = "begin or end a film"
 
 
 class Panel:
@@ -152,15 +158,18 @@ class Panel:
     Attributes:
         skill: the skill and its goal.
         legs: the controls of a robot on its feet; None for one that hangs.
+        arms, view: the controls of the arms, and of what is shown.
     """
 
     def __init__(
-        self, server: viser.ViserServer, skills: Mapping[str, SkillSpec], first: str, *, standing: bool, restarts: bool
-    ) -> None:
+        self, server: viser.ViserServer, from_odom: Callable[[Array], Array], skills: Mapping[str, SkillSpec],
+        first: str, *, standing: bool, restarts: bool,
+    ) -> None:  # fmt: skip
         """Build the panel of `server`.
 
         Args:
             server: of the view.
+            from_odom: see `ArmPanel`.
             skills: what there is to start.
             first: the skill that is chosen at first.
             standing: whether the robot stands on its feet.
@@ -180,6 +189,8 @@ class Panel:
         with gui.add_folder("Operator"):
             told = "The motors damp, and a robot on its feet sinks down. Start over sets it up again."
             self._stop = gui.add_button("Emergency stop", color="red", icon=Icon.HAND_STOP, hint=told)
+            if standing:
+                gui.add_html(f'<div style="{SMALL};padding:0 14px 4px">{told.partition(". ")[0]}.</div>')
             self._release = gui.add_button("Release emergency stop", visible=False)
             self._revive = gui.add_button("Reset and activate", visible=False)
             self._pause = gui.add_button("Pause", color="gray")
@@ -188,7 +199,11 @@ class Panel:
             self._answers = gui.add_button("Allow", color="green", visible=False), gui.add_button("Deny", visible=False)
         self.skill = SkillPanel(gui, skills, first)
         self.legs = LegsPanel(gui) if standing else None
+        self.arms = ArmPanel(server, from_odom)
+        self.view = ViewPanel(server, standing=standing)
         buttons = [
+            (self.arms.move, Button.MOVE),
+            (self.view.record, Button.RECORD),
             (self._stop, Button.PRESS),
             (self._release, Button.RELEASE),
             (self._revive, Button.REVIVE),
@@ -259,7 +274,12 @@ class Panel:
             if handle.visible != visible:
                 handle.visible = visible
         idle = not busy and status.safety is GateState.ACTIVE
-        for handle, enabled in ((self.skill.start, idle), (self.skill.cancel, busy), (self._restart, not busy)):
+        for handle, enabled in (
+            (self.skill.start, idle),
+            (self.arms.move, idle),
+            (self.skill.cancel, busy),
+            (self._restart, not busy),
+        ):
             if handle.disabled == enabled:
                 handle.disabled = not enabled
         word = "Resume" if paused else "Pause"
@@ -271,10 +291,9 @@ def _status_html(
     status: Status, stages: list[tuple[str, float]], factor: float, note: str, paused: bool, standing: bool
 ) -> str:
     colour = SAFETY_COLOURS[status.safety]
-    small = "font-size:12px;opacity:.75"
     parts = [
         '<div style="padding:4px 14px 8px;font-size:14px;line-height:1.4;font-variant-numeric:tabular-nums">',
-        f'<div style="{small};display:flex;justify-content:space-between"><span>robot time {status.t:.1f} s</span>'
+        f'<div style="{SMALL};display:flex;justify-content:space-between"><span>robot time {status.t:.1f} s</span>'
         f"<span>{'paused' if paused else f'{factor:.2f} x real time'}</span></div>",
         f'<div style="margin:6px 0;padding:4px 10px;border-radius:6px;background:{colour};color:#fff">'
         f"<b>{escape(MEANING[status.safety])}</b>"

@@ -13,6 +13,7 @@ import io
 import logging
 import math
 import socket
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 from unittest import mock
 
@@ -39,8 +40,24 @@ LAG = 0.6
 WORLD = "/world"
 Camera = tuple[tuple[float, float, float], tuple[float, float, float]]
 """Position and the point looked at [m]."""
-HANGING: Camera = ((2.1, 1.1, 1.95), (0.34, -0.04, 1.12))
-STANDING: Camera = ((-1.25, -2.55, 1.55), (0.25, 0.0, 0.82))
+CAMERAS: dict[str, Camera] = {
+    "hanging": ((2.1, 1.1, 1.95), (0.34, -0.04, 1.12)),
+    "standing": ((-1.25, -2.55, 1.55), (0.25, 0.0, 0.82)),
+    "front": ((3.0, 0.0, 1.3), (0.0, 0.0, 0.9)),
+    "left": ((0.2, 3.0, 1.3), (0.2, 0.0, 0.9)),
+    "right": ((0.2, -3.0, 1.3), (0.2, 0.0, 0.9)),
+    "behind": ((-3.0, 0.0, 1.6), (0.0, 0.0, 0.9)),
+    "above": ((0.0, 0.0, 4.5), (0.01, 0.0, 0.0)),
+    "hands": ((-0.15, -0.75, 1.55), (0.4, 0.0, 1.0)),
+}
+"""Where the spectator may stand, as seen from the robot."""
+FRAMES = (BASE_LINK, "torso_link", "left_hand", "right_hand")
+LAYERS = ("frames", "clouds", "collision shapes", "contacts")
+"""What can be shown besides the bodies."""
+CLOUD_POINTS = 4000
+"""Points of a cloud that are sent at most."""
+FORCE_ARROW = 0.001
+"""Length of a contact's arrow per force [m/N]."""
 
 
 class Stage:
@@ -60,7 +77,7 @@ class Stage:
         scene.add_light_directional("/fill", intensity=0.5, position=(2.0, 3.0, 2.0))
         scene.set_background_image(_sky(), format="png")
         camera = server.initial_camera
-        camera.position, camera.look_at = STANDING if standing else HANGING
+        camera.position, camera.look_at = CAMERAS["standing" if standing else "hanging"]
         camera.fov = 0.75
         self._world = scene.add_frame(WORLD, show_axes=False)
         self._bodies = {mesh.name: scene.add_glb(f"{WORLD}/{mesh.name}", mesh.glb) for mesh in view.meshes()}
@@ -70,6 +87,13 @@ class Stage:
             f"{WORLD}/push", np.zeros((1, 2, 3)), PUSH_COLOUR, shaft_radius=0.014, head_radius=0.035, visible=False
         )
         self._followed: Array = np.zeros(2)
+        self._scene = scene
+        self._frames = {
+            body: scene.add_frame(f"{WORLD}/frame_{body}", axes_length=0.15, axes_radius=0.006, visible=False)
+            for body in FRAMES
+        }
+        self._shapes: dict[str, viser.SceneNodeHandle] = {}
+        self._layers: frozenset[str] = frozenset()
         self.show(0.0, None)
 
     def look(self, view: SpectatorView) -> None:
@@ -77,22 +101,57 @@ class Stage:
         self._view = view
         self._followed = np.zeros(2)
 
-    def show(self, dt: float, target: Array | None) -> None:
+    def show(
+        self, dt: float, target: Array | None, poses: tuple[Array, Array] | None = None, *, follow: bool = True
+    ) -> None:
         """Show the present moment.
 
         Args:
             dt: time since the last one [s].
             target: (3,) what the skill aims at, in odom [m], or None.
+            poses: of another moment, as of `SpectatorView.poses`.
+            follow: whether the camera goes with the robot.
         """
-        for name, position, wxyz in zip(self._view.moving, *self._view.poses(), strict=True):
-            handle = self._bodies[name]
-            handle.position, handle.wxyz = position, wxyz
-        base = self._view.position(BASE_LINK)[:2]
-        self._followed += (1.0 - math.exp(-dt / LAG)) * (base - self._followed)
+        names = self._view.moving
+        placed = dict(zip(names, zip(*(poses or self._view.poses()), strict=True), strict=True))
+        for name, (position, wxyz) in placed.items():
+            for handle in (self._bodies[name], self._frames.get(name), self._shapes.get(name)):
+                if handle is not None:
+                    handle.position, handle.wxyz = position, wxyz
+        base = placed[BASE_LINK][0][:2] if BASE_LINK in placed else self._view.position(BASE_LINK)[:2]
+        if follow:
+            self._followed += (1.0 - math.exp(-dt / LAG)) * (base - self._followed)
         self._world.position = (-self._followed[0], -self._followed[1], 0.0)
         self._target.visible = self._target_label.visible = target is not None
         if target is not None:
             self._target.position = self._target_label.position = self._view.from_odom(target)
+
+    def show_layers(self, layers: frozenset[str], clouds: Sequence[Array]) -> None:
+        """Show `layers`, some of `LAYERS`, and of `clouds` (n, 3) in odom [m]; contacts are those of the present."""
+        if "collision shapes" in layers and not self._shapes:
+            for mesh in self._view.meshes(collision=True):
+                self._shapes[mesh.name] = self._scene.add_glb(f"{WORLD}/shape_{mesh.name}", mesh.glb)
+        for name, handles in (("frames", self._frames), ("collision shapes", self._shapes)):
+            if (name in layers) != (name in self._layers):
+                for handle in handles.values():
+                    handle.visible = name in layers
+        shown = [self._view.from_odom(points) for points in clouds if len(points)] if "clouds" in layers else []
+        self._replace("cloud", np.concatenate(shown) if shown else None)
+        self._replace("contacts", self._view.contacts(FORCE_ARROW) if "contacts" in layers else None)
+        self._layers = layers
+
+    def _replace(self, name: str, points: Array | None) -> None:
+        """Show a cloud (n, 3) or arrows (n, 2, 3); None or nothing takes it away."""
+        path = f"{WORLD}/{name}"
+        if points is None or not len(points):
+            self._scene.remove_by_name(path)
+        elif points.ndim == 2:
+            some = points[:: 1 + len(points) // CLOUD_POINTS].astype(np.float32)
+            self._scene.add_point_cloud(path, some, (40, 120, 220), point_size=0.008)
+        else:
+            self._scene.add_arrows(
+                path, points.astype(np.float32), (30, 160, 90), shaft_radius=0.006, head_radius=0.015
+            )
 
     def show_push(self, force: Array, body: str) -> None:
         """Show a push with the (3,) `force` in the world [N] on a body; zero hides it."""

@@ -8,8 +8,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from golem.capabilities.perception.lift import scene_of
 from golem.interfaces import topics
 from golem.interfaces.payloads import GateState, LegStatus
+from golem.middleware.bus import Bus
 from golem.robots.mujoco.spectator import SpectatorView
 from golem.runtime.lockstep import LockstepRunner
 from golem.types import Array, BaseEstimate
@@ -118,3 +120,9 @@ def camera_picture(running: LockstepRunner, view: SpectatorView, camera: str) ->
             x0, y0, x1, y1 = (round(float(v) / 2) for v in found.detection.box)
             cv2.rectangle(picture, (x0, y0), (x1, y1), CLASS_COLOURS.get(found.label, (255, 255, 255)), 1)
     return picture
+
+
+def clouds(bus: Bus) -> list[Array]:
+    """Return (n, 3) points in odom that the head camera and the LiDAR show now [m]."""
+    frame, scan = bus.latest(topics.rgbd_images("head")), bus.latest(topics.SCAN)
+    return ([] if frame is None else [scene_of(frame)]) + ([] if scan is None else [scan.points])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import mujoco
 import numpy as np
 import trimesh
@@ -21,11 +23,26 @@ Look = tuple[tuple[float, ...], float]
 """Colour (rgba, 0 to 1) and roughness (0 to 1) of a surface."""
 
 
+COLLISION: Look = ((0.1, 0.75, 0.35, 0.45), 0.8)
+"""How shapes that collide are shown."""
+
+
 def visual_geoms(model: mujoco.MjModel) -> dict[int, list[int]]:
     """Return the geoms a camera can see, by the body that moves them; those that cannot move are at body 0."""
+    return _by_mover(model, lambda geom: int(model.geom_group[geom]) in SHOWN_GROUPS and look(model, geom)[0][3] > 0.0)
+
+
+def collision_geoms(model: mujoco.MjModel) -> dict[int, list[int]]:
+    """Return the geoms of moving bodies that meet others, by the body that moves them."""
+    meets = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
+    found = _by_mover(model, lambda geom: bool(meets[geom]))
+    return {body: geoms for body, geoms in found.items() if body}
+
+
+def _by_mover(model: mujoco.MjModel, wanted: Callable[[int], bool]) -> dict[int, list[int]]:
     shown: dict[int, list[int]] = {}
     for geom in range(model.ngeom):
-        if int(model.geom_group[geom]) in SHOWN_GROUPS and look(model, geom)[0][3] > 0.0:
+        if wanted(geom):
             body = int(model.geom_bodyid[geom])
             mover = body if model.body_weldid[body] else 0
             shown.setdefault(mover, []).append(geom)
@@ -55,22 +72,25 @@ def mean_colour(model: mujoco.MjModel, texture: int) -> tuple[float, float, floa
     return red, green, blue
 
 
-def body_meshes(model: mujoco.MjModel, data: mujoco.MjData) -> dict[int, trimesh.Scene]:
+def body_meshes(model: mujoco.MjModel, data: mujoco.MjData, *, collision: bool = False) -> dict[int, trimesh.Scene]:
     """Return per moving body its visual geoms in the body's frame, joined where they look the same.
 
     Args:
         model: the model.
         data: its kinematics place what cannot move (body 0, world frame).
+        collision: whether what collides is returned instead, in one colour.
     """
     meshes: dict[int, trimesh.Scene] = {}
-    for body, geoms in visual_geoms(model).items():
+    for body, geoms in (collision_geoms if collision else visual_geoms)(model).items():
         parts: dict[Look, list[trimesh.Trimesh]] = {}
         for geom in geoms:
             T = pose_matrix(model.geom_pos[geom], model.geom_quat[geom])
             if body == 0:
                 T[:3, :3] = data.geom_xmat[geom].reshape(3, 3)
                 T[:3, 3] = data.geom_xpos[geom]
-            parts.setdefault(look(model, geom), []).append(geom_mesh(model, geom).apply_transform(T))
+            parts.setdefault(COLLISION if collision else look(model, geom), []).append(
+                geom_mesh(model, geom).apply_transform(T)
+            )
         meshes[body] = trimesh.Scene({f"part{i}": _surface(*item) for i, item in enumerate(parts.items())})
     return meshes
 

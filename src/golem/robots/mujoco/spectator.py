@@ -112,11 +112,11 @@ class SpectatorView:
         """The visible bodies that can move, in the order of `poses`."""
         return [self._model.body(int(body)).name for body in self._moving]
 
-    def meshes(self) -> list[BodyMesh]:
-        """Return one mesh per visible body."""
+    def meshes(self, *, collision: bool = False) -> list[BodyMesh]:
+        """Return one mesh per visible body, or per moving body that collides."""
         from trimesh.exchange.gltf import export_glb
 
-        meshes = self._meshes(self._model, self._data)
+        meshes = self._meshes(self._model, self._data, collision=collision)
         return [BodyMesh(self._model.body(body).name, export_glb(scene)) for body, scene in meshes.items()]
 
     def poses(self) -> tuple[Array, Array]:
@@ -127,8 +127,18 @@ class SpectatorView:
         """Return (3,) where a body is in the world [m]."""
         return self._data.body(body).xpos.copy()
 
+    def contacts(self, length: float) -> Array:
+        """Return (n, 2, 3) arrows in the world [m]: each contact's force on the second body, `length` [m/N] long."""
+        arrows, wrench = np.zeros((self._data.ncon, 2, 3)), np.zeros(6)
+        for i in range(self._data.ncon):
+            contact = self._data.contact[i]
+            mujoco.mj_contactForce(self._model, self._data, i, wrench)
+            arrows[i] = contact.pos
+            arrows[i, 1] += length * (wrench[:3] @ contact.frame.reshape(3, 3))
+        return arrows[np.linalg.norm(arrows[:, 1] - arrows[:, 0], axis=1) > 5.0 * length]
+
     def from_odom(self, point: Array) -> Array:
-        """Return (3,) a point of the odom frame in the world: odom is where the pelvis was at the start."""
+        """Return (3,) or (n, 3) points of the odom frame in the world: odom is where the pelvis was at the start."""
         return np.asarray(point, dtype=float) + self._origin
 
     def follow(self, body: str) -> None:
