@@ -76,7 +76,8 @@ def read_yaml(text: str, name: str, foreign: bool = False) -> object:
     Args:
         text: the file's text.
         name: the file, for messages.
-        foreign: whether another program wrote it: its Python objects are read as None then.
+        foreign: whether another program wrote it: its Python objects are read as None
+            then, and of a key that is named twice the last counts, as other readers have it.
 
     Raises:
         ConfigError: it is not YAML, names a key twice, or refers to itself; names the line.
@@ -208,6 +209,8 @@ def _sequence(what: str, kind: type[Any], inner: tuple[Any, ...], value: Any) ->
 class _Loader(yaml.SafeLoader):
     """YAML whose mappings name each key once, and in which nothing refers to itself."""
 
+    repeats = False
+
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
         """Refuse aliases: no file of ours has a use for them, and they can nest without end."""
         if self.check_event(yaml.AliasEvent):
@@ -221,7 +224,7 @@ class _Loader(yaml.SafeLoader):
         for key, _ in node.value:
             if not isinstance(key, yaml.ScalarNode):
                 raise yaml.constructor.ConstructorError(None, None, "a key is one word", key.start_mark)
-            if key.value in seen:
+            if key.value in seen and not self.repeats:
                 raise yaml.constructor.ConstructorError(None, None, f"'{key.value}' occurs twice", key.start_mark)
             seen.add(str(key.value))
         return super().construct_mapping(node, deep)
@@ -234,7 +237,9 @@ _Loader.add_implicit_resolver(
 
 
 class _ForeignLoader(_Loader):
-    """The same, which makes nothing of Python objects."""
+    """The same, which makes nothing of Python objects, and takes the last of equal keys."""
+
+    repeats = True
 
 
 def _nothing(loader: yaml.SafeLoader, suffix: str, node: yaml.Node) -> None:

@@ -11,11 +11,12 @@ from golem.errors import ConfigError
 from golem.robots.model.contact_shapes import FOOT_FRICTION, Feet
 from golem.robots.mujoco.hoist import HoistConfig
 from golem.robots.worlds.conditions import LayoutKind, check_condition
+from golem.robots.worlds.robocasa import RobocasaConfig
 
 Support = Literal["hoist", "ground"]
 World = Literal[
     "pack", "ioniq5", "plant", "ioniq5_plant",
-    "open", "slope", "step", "rubble", "furnished", "corridor", "kitchen", "counter",
+    "open", "slope", "step", "rubble", "furnished", "corridor", "kitchen", "counter", "robocasa",
 ]  # fmt: skip
 IONIQ5, PLANTS, WORKSHOPS = ("ioniq5", "ioniq5_plant"), ("plant", "ioniq5_plant"), ("pack", "ioniq5")
 """Worlds with the real pack, those with a pack in a furnished hall, and those with one in a workshop."""
@@ -38,7 +39,7 @@ class MujocoConfig:
             that hall with the pack to work on; `corridor`: two bare walls; `kitchen`: a fridge before the robot and a
             counter with tableware beside it; `counter`: that kitchen with the counter before the robot, four things
             within reach. `ioniq5` and `ioniq5_plant`: as `pack` and `plant`, with the fasteners of a real pack, its rim
-            0.857 m over the floor on which the robot would stand.
+            0.857 m over the floor on which the robot would stand. `robocasa`: a kitchen of the user's RoboCasa.
         arms: where they are when the world begins: at home, or hanging as they do while the motors are limp.
         stance: where the robot should stand before pack or counter, from where it begins: x, y [m] and yaw [rad], which
             is 0 in a kitchen.
@@ -48,6 +49,7 @@ class MujocoConfig:
         mirrored: whether what stands on a counter is mirrored, left to right.
         sizes: how much larger or smaller than its kind a thing on a counter is at most, as a share; the seed draws it.
         conditions: those of `worlds.conditions` that are not left to the layout, e.g. `{light: 0.3}`.
+        robocasa: which kitchen of RoboCasa.
         hoist: how the robot is held.
         reach_y: near-edge fasteners with |y| up to this are loosened [m]; a varied layout draws among those up to
             `REACH_Y`. Of an ioniq5 those all round.
@@ -79,6 +81,7 @@ class MujocoConfig:
     mirrored: bool = False
     sizes: float = 0.0
     conditions: dict[str, float | str] = field(default_factory=dict[str, "float | str"])
+    robocasa: RobocasaConfig = field(default_factory=RobocasaConfig)
     hoist: HoistConfig = field(default_factory=HoistConfig)
     reach_y: float = 0.15
     torque_profile: str = "urdf"
@@ -130,11 +133,13 @@ class MujocoConfig:
         varied = self.layout != "nominal" and self.world not in KITCHENS
         if self.world not in WITH_PACK and (self.conditions or varied or self.gantry):
             raise ConfigError(f"The world '{self.world}' has no pack with layout, conditions or a gantry.")
+        if (self.world == "robocasa") != (self.robocasa.layout is not None):
+            raise ConfigError("The world 'robocasa', and no other, takes a layout file: robocasa: {layout: PATH}.")
         if (self.mirrored or self.sizes) and self.world != "counter":
             raise ConfigError(
                 f"Only a counter's things are mirrored or of other sizes, not those of the world '{self.world}'."
             )
-        if self.world in KITCHENS and self.stance[2] != 0.0:
+        if self.world in (*KITCHENS, "robocasa") and self.stance[2] != 0.0:
             raise ConfigError(f"The twin's stance before a {self.world} has the yaw 0, not {self.stance[2]:g}.")
         own = (self.feet, self.torque_profile, self.self_collision)
         if self.mjcf is not None and own != ("spheres", "urdf", None):

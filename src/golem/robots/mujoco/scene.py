@@ -28,6 +28,7 @@ from golem.robots.worlds.kitchen import KitchenLayout, add_kitchen, draw_counter
 from golem.robots.worlds.layout import GANTRY, PackLayout
 from golem.robots.worlds.pack import PackNames, add_pack
 from golem.robots.worlds.pack_part import add_clutter
+from golem.robots.worlds.robocasa import add_robocasa
 from golem.robots.worlds.screws import ScrewDraw, draw_screws
 from golem.true_runs import true_runs
 from golem.types import SIDES, Array, CameraInfo, PlanarPose
@@ -166,6 +167,10 @@ def _build(spec: mujoco.MjSpec, config: MujocoConfig, layout: PackLayout, profil
         kitchen = lay_kitchen(config, seed, layout.top_z - PackLayout().top_z)
         names = PackNames((), np.zeros((0, 3)), add_kitchen(spec, kitchen, (stance.x, stance.y)))
         _add_kitchen_onlooker(spec, kitchen, stance)
+    elif config.world == "robocasa":
+        found = add_robocasa(spec, config.robocasa, stance, stream(seed, "world/kitchen"))
+        names, at = PackNames((), np.zeros((0, 3)), found), np.array([stance.x, stance.y, 0.0])
+        _aim(spec.worldbody.add_camera(name=ONLOOKER.name), at + (-1.2, 0.9, 1.9), at + (0.4, 0.0, 0.9))
     else:
         people = _add_terrain(spec, config, seed)
         _add_companion(spec)

@@ -115,7 +115,7 @@ def draw_kitchen(rng: np.random.Generator, raised: float = 0.0, varied: bool = T
     top, edge = 0.94 + raised, 0.44
     kinds = [*KINDS, *(str(kind) for kind in rng.choice(list(KINDS), size=int(rng.integers(0, 4))))]
     area = Area((edge + 0.09, edge + 0.40), (0.12, 1.25), APART)
-    things = _draw_things(rng, kinds, top, area, sign)
+    things = draw_things(rng, kinds, top, area, sign)
     colours = FRONTS[picks[0]], TOPS[picks[1]], STEELS[picks[2]]
     return KitchenLayout(fridge, top, edge, 0.06, things, *colours)
 
@@ -137,7 +137,7 @@ def draw_counter(
     kinds = [str(kind) for kind in rng.permutation(list(KINDS))]
     area = Area((edge + 0.09, edge + 0.22), (-0.38, 0.38), LEAST_APART)
     # Where one finds no room, all are put elsewhere.
-    drawn = (_draw_things(rng, kinds, top, area, 1.0) for _ in range(40))
+    drawn = (draw_things(rng, kinds, top, area, 1.0) for _ in range(40))
     things = next(some for some in drawn if len(some) == len(kinds))
     grown = (1.0 + sizes * rng.uniform(-1.0, 1.0, len(things))).tolist()
     things = tuple(replace(thing, size=size) for thing, size in zip(things, grown, strict=True))
@@ -155,7 +155,7 @@ def mirrored(layout: KitchenLayout) -> KitchenLayout:
     return replace(layout, things=things)
 
 
-def _draw_things(
+def draw_things(
     rng: np.random.Generator, kinds: Sequence[str], top: float, area: Area, sign: float
 ) -> tuple[StandingThing, ...]:
     """Return things of `kinds` on the counter, apart from each other; one that finds no room is left out."""
@@ -184,11 +184,7 @@ def add_kitchen(
         layout: as seen from where the robot should stand.
         at: that place in the world, x and y [m].
     """
-    # MuJoCo's native collision of convex shapes gives a can at a pad's edge a normal across the pad, which throws it
-    # out of the hand; libccd gives it the right one.
-    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_NATIVECCD
-    spec.option.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
-    spec.option.impratio, spec.option.cone = GRIP, mujoco.mjtCone.mjCONE_ELLIPTIC
+    set_contacts(spec)
     _add_materials(spec, layout)
     sign = 1.0 if layout.fridge.handle_y < 0.0 else -1.0
     _add_room(spec, at)
@@ -196,15 +192,29 @@ def add_kitchen(
     _add_counter(room, layout, sign)
     fridge = replace(layout.fridge, front=layout.fridge.front + at[0], handle_y=layout.fridge.handle_y + at[1])
     add_fridge(spec, fridge)
-    found = [_handle(fridge)]
-    for thing in layout.things:
+    return (_handle(fridge), *stand(spec, layout.things, at))
+
+
+def set_contacts(spec: mujoco.MjSpec) -> None:
+    """Set the solver's options so that a hand holds tableware."""
+    # MuJoCo's native collision of convex shapes gives a can at a pad's edge a normal across the pad, which throws it
+    # out of the hand; libccd gives it the right one.
+    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_NATIVECCD
+    spec.option.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
+    spec.option.impratio, spec.option.cone = GRIP, mujoco.mjtCone.mjCONE_ELLIPTIC
+
+
+def stand(spec: mujoco.MjSpec, things: Sequence[StandingThing], at: tuple[float, float]) -> list[PackPart]:
+    """Add `things` as seen from `at`, x and y in the world [m]; return what a detector can be asked for."""
+    found: list[PackPart] = []
+    for thing in things:
         x, y, z = thing.position
         place = (x + at[0], y + at[1], z)
         geoms = add_object(spec, thing.kind, thing.body, place, thing.yaw, thing.colour, size=thing.size)
         radius, height = (thing.size * length for length in KINDS[thing.kind])
         top = np.array(place) + (0.0, 0.0, height)
         found.append(PackPart(thing.kind, thing.body, geoms, top, np.array([2 * radius, 2 * radius, height])))
-    return tuple(found)
+    return found
 
 
 def _handle(fridge: FridgeLayout) -> PackPart:
