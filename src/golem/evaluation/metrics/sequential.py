@@ -20,6 +20,7 @@ from golem.evaluation.metrics.anytime import (
     difference_interval,
     equal_within,
     paired_evidence,
+    unpaired_evidence,
 )
 from golem.evaluation.metrics.statistics import Interval, holm, wilson
 from golem.evaluation.metrics.tables import p_value
@@ -63,8 +64,11 @@ class StopRule:
             raise ConfigError(f"The score '{self.score}' is not between 0 and 1 in every trial; name a share.")
         return found
 
-    def decided_after(self, a: Array, b: Array | None = None) -> int | None:
-        """Return after how many trials of one method, or of two on the same scenes, it is decided; None if not yet."""
+    def decided_after(self, a: Array, b: Array | None = None, *, paired: bool = True) -> int | None:
+        """Return after how many trials of one method, or of two, it is decided; None if not yet.
+
+        `paired` says that both saw the same scenes.
+        """
         alpha = ALPHA / self.comparisons
         if not len(a):
             return None
@@ -72,7 +76,7 @@ class StopRule:
             low, high = confidence_sequence(a, alpha)
             done = high - low <= 2.0 * self.margin
         else:
-            done = (anytime_p(paired_evidence(a, b)) <= alpha) | equal_within(a, b, self.margin, alpha)
+            done = (anytime_p(evidence(a, b, paired)) <= alpha) | equal_within(a, b, self.margin, alpha)
         return int(np.argmax(done)) + 1 if done.any() else None
 
     def ends(self, values: Mapping[str, Array], n: int, ahead: int) -> dict[str, int]:
@@ -94,7 +98,7 @@ class StopRule:
 
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """Two sides on the same trials, as they stand.
+    """Two sides, as they stand.
 
     Attributes:
         a, b: the sides.
@@ -114,17 +118,24 @@ class Decision:
     after: int | None
 
 
-Pair = tuple[str, str, Array, Array]
-"""Names of two sides, and what is compared of their trials, in the order of the indices they have in common."""
+Pair = tuple[str, str, Array, Array, bool]
+"""Names of two sides, what is compared of their trials in the order of the indices they have in common, and whether both
+saw the same scenes."""
+
+
+def evidence(a: Array, b: Array, paired: bool) -> Array:
+    """Return the logarithm of the e-process against "a and b are equally good"; scores are always taken as pairs."""
+    yes_or_no = all(np.isin(side, (0.0, 1.0)).all() for side in (a, b))
+    return paired_evidence(a, b) if paired or not yes_or_no else unpaired_evidence(a, b)
 
 
 def decisions(pairs: Sequence[Pair], rule: StopRule) -> tuple[Decision, ...]:
     """Return what is known of each pair, with Holm's adjustment over all, and over those of the rule still to come."""
-    ps = [float(anytime_p(paired_evidence(a, b))[-1]) for *_, a, b in pairs]
+    ps = [float(anytime_p(evidence(a, b, paired))[-1]) for *_, a, b, paired in pairs]
     adjusted_ps = holm([*ps, *[1.0] * (rule.comparisons - len(ps))])
     return tuple(
-        Decision(one, other, len(a), difference_interval(a, b), p, adjusted, rule.decided_after(a, b))
-        for (one, other, a, b), p, adjusted in zip(pairs, ps, adjusted_ps, strict=False)
+        Decision(one, other, len(a), difference_interval(a, b), p, adjusted, rule.decided_after(a, b, paired=paired))
+        for (one, other, a, b, paired), p, adjusted in zip(pairs, ps, adjusted_ps, strict=False)
     )
 
 
@@ -143,9 +154,15 @@ def pairs_of(records: Sequence[TrialRecord], methods: Sequence[str], rule: StopR
 def pair_of(
     one: str, a: Mapping[int, TrialRecord], other: str, b: Mapping[int, TrialRecord], rule: StopRule
 ) -> Pair | None:
-    """Return the trials that two sides have in common; None where there is none."""
+    """Return the trials of two sides by the indices they have in common; None where there is none.
+
+    Of another seed the scenes are others, too.
+    """
     both = sorted(a.keys() & b.keys())
-    return (one, other, rule.values([a[i] for i in both]), rule.values([b[i] for i in both])) if both else None
+    if not both:
+        return None
+    paired = all(a[i].seed == b[i].seed for i in both)
+    return one, other, rule.values([a[i] for i in both]), rule.values([b[i] for i in both]), paired
 
 
 def sequential_tables(rates: Mapping[str, Array], found: Sequence[Decision], rule: StopRule) -> list[TextTable]:

@@ -53,7 +53,7 @@ class StudyFile:
         about: what it is for.
         by_construction: which differences the profile puts in, said beside the tables.
         cells: what is measured.
-        compare: pairs of cells on the same seeds, compared method by method.
+        compare: pairs of cells, compared method by method: scene by scene where their seeds are the same.
         n, best_n, profile, seed: for entries that do not say.
         stop, margin, score: see `golem ladder`.
     """

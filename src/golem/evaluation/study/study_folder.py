@@ -129,7 +129,7 @@ class Study:
         for cell in self.cells:
             if not cell.adaptive:
                 own = pairs_of(cell.records, cell.methods, self.rule)
-                found += [(f"{cell.name}: {a}", b, one, other) for a, b, one, other in own]
+                found += [(f"{cell.name}: {a}", b, one, other, same) for a, b, one, other, same in own]
         by_name = {cell.name: cell for cell in self.cells}
         for one, other in self.compare:
             if one in by_name and other in by_name:
