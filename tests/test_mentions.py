@@ -10,7 +10,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 SOURCE = ROOT / "src" / "golem"
 PAGES = [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")]
-HISTORY = ("CHANGELOG.md", "docs/decisions", "docs/results")
+HISTORY = ("CHANGELOG.md", "docs/decisions", "docs/history", "docs/results")
 """Pages of what once was: their names may be gone."""
 FILE = re.compile(r"[\w./-]+\.(?:py|sh)")
 NAME = re.compile(r"(?:golem\.)?((?:[a-z_][a-z0-9_]*\.)+)([A-Za-z_]\w*)")
