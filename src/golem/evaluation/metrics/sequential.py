@@ -119,8 +119,8 @@ class Decision:
 
 
 Pair = tuple[str, str, Array, Array, bool]
-"""Names of two sides, what is compared of their trials in the order of the indices they have in common, and whether both
-saw the same scenes."""
+"""Names of two sides, what is compared of their trials in the order of the indices they have in common, and whether
+both saw the same scenes."""
 
 
 def evidence(a: Array, b: Array, paired: bool) -> Array:
