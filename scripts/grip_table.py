@@ -95,6 +95,8 @@ class GripConfig:
     n: int = 200
     """Things of each kind."""
     seed: int = 0
+    safety: float = 2.0
+    """By how much more than the weight a tuned force holds; 2 is what `take` has by default."""
     fixed: tuple[float, ...] = (4.0, 16.0)
     """Fixed forces of each finger [N]; 16 N is what `take` presses with by default."""
 
@@ -108,7 +110,7 @@ def rows(config: GripConfig, label: str, thing: Thing) -> list[tuple[str, ...]]:
     friction = believed.friction * rng.uniform(*FRICTION, config.n)
     stiffness = believed.stiffness * np.exp(rng.uniform(math.log(STIFFNESS[0]), math.log(STIFFNESS[1]), config.n))
     needed = mass * (GRAVITY + LIFT) / (2.0 * friction)
-    tuned = float(np.clip(holding_force(believed, take.safety, take.squeeze), take.touch, take.force))
+    tuned = float(np.clip(holding_force(believed, config.safety, take.squeeze), take.touch, take.force))
     grips: list[tuple[str, type[MagpieHand], float]]
     grips = [("deligrasp, tuned", DeliGrasp, tuned), ("magpie, tuned", MagpieHand, tuned)]
     grips += [(f"magpie, {force:g} N", MagpieHand, force) for force in config.fixed]
