@@ -22,6 +22,7 @@ PLACES = ("/proc/", "/sys/", "/dev/shm", "/run/")
 LIBRARIES = ("libc.so.6", "librt.so.1")
 
 GUARDED = {
+    "datasets/own_priority.py": "only where the system has sched_setscheduler and /proc",
     "evaluation/harness/local_executor.py": "only where CAN_COPY, which asks for pidfd_open",
     "evaluation/speed/memory_bench.py": "says 0 MB elsewhere",
     "middleware/dds/interfaces.py": "the extra `dds`; None elsewhere",

@@ -27,11 +27,15 @@ INTERRUPTED = 130
 
 
 def _demo(words: list[str]) -> int:
-    """The robot pulls loosened screws from a pack in front of you; --walk: it walks to one first."""
+    """The robot pulls loosened screws from a pack in front of you; --walk: to one; --pack: it empties one."""
     _prepare_graphics()
     from golem.demo import DemoConfig, run_demo
 
     config = _parse(DemoConfig, "demo", words)
+    if config.pack:
+        from golem.demo_pack import run_pack_demo
+
+        return 0 if run_pack_demo(config) else FAILED
     if config.walk:
         from golem.demo_walk import run_walk_demo
 

@@ -63,6 +63,8 @@ class DemoConfig:
     """Path of a stack file, or the name of a shipped one; with `tether` the robot hangs from a hoist."""
     walk: bool = False
     """Walk through a hall to the pack instead, around walls and obstacles; the stack is then `hall` by default."""
+    pack: bool = False
+    """Empty an edge of a real pack by a gantry's list instead, filmed at eight times real time."""
     headless: bool = field(default_factory=no_display)
     """Write a film instead of opening the live view; the default where there is no display."""
     screws: int = 2

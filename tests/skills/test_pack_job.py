@@ -25,6 +25,7 @@ from golem.skills.disassemble_goal import DisassembleGoal
 from golem.skills.fastener_list import read_list
 from golem.skills.job_file import Fate, JobFault, JobFile
 from golem.skills.pack_job import KEEP_OFF, SILENT, Gantry, fit_frames, matched
+from golem.skills.pack_picture import COLOURS
 from golem.skills.pick_config import PickReport
 from golem.types import PlanarPose
 
@@ -278,3 +279,11 @@ def test_frames_are_related_by_three_places_that_are_known_in_both() -> None:
     assert 0.0005 < off < 0.02
     known, seen = matched(np.array([[0.0, 0.0], [0.1, 0.0]]), np.array([[0.11, 0.0], [0.9, 0.0]]), 0.045)
     assert known.tolist() == [[0.1, 0.0]] and seen.tolist() == [[0.11, 0.0]]
+
+
+def test_people_see_how_far_it_is(tmp_path: Path) -> None:
+    world, fates = job(tmp_path)
+    shown = world.context.bus.latest(topics.PACK_PLAN)
+    assert shown is not None and set(fates) == {Fate.IN_TRAY}
+    green = (shown.rgb == COLOURS[Fate.IN_TRAY]).all(axis=2)
+    assert green.sum() > 20 * len(PLACES)

@@ -89,6 +89,7 @@ class Film:
         size: tuple[int, int] = (960, 540),
         fps: float = 12.5,
         recorder: BalanceRecorder | None = None,
+        speed: float = 1.0,
     ) -> None:
         """Film `robot`.
 
@@ -97,8 +98,9 @@ class Film:
             size: width and height of the film [px].
             fps: pictures per second of robot time.
             recorder: whoever samples its balance; its CoM margin is then in the picture.
+            speed: robot time per time of the film.
         """
-        self._size, self.fps, self._recorder = size, fps, recorder
+        self._size, self.fps, self._recorder, self._speed = size, fps, recorder, speed
         rendered = (round(size[0] * OVERSAMPLING), round(size[1] * OVERSAMPLING))
         self._view = SpectatorView(robot, shots(robot), rendered)
         self._frames: list[NDArray[np.uint8]] = []
@@ -130,7 +132,10 @@ class Film:
         floor = map_view(running.bus)
         cameras = {"palm camera": "right_hand", "head camera": "head"} if floor is None else {}
         insets = {label: camera_picture(running, self._view, name) for label, name in cameras.items()}
-        picture = self._compose(picture, insets if floor is None else {"map": floor}, status)
+        insets |= {} if floor is None else {"map": floor}
+        plan = running.bus.latest(topics.PACK_PLAN)
+        insets |= {} if plan is None else {"pack": plan.rgb}
+        picture = self._compose(picture, insets, status)
         packed = cv2.imencode(".png", picture[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 1])[1]
         self._frames.append(packed)
         return picture
@@ -217,14 +222,14 @@ class Film:
         stride = math.ceil(len(self._frames) / WEBP_FRAMES)
         numbers = tqdm(range(0, len(self._frames), stride), path.name, leave=False, disable=None)
         first, *others = (Image.fromarray(self.picture(i, WEBP_SCALE)) for i in numbers)
-        duration = round(1000.0 * stride / self.fps)
+        duration = round(1000.0 * stride / (self.fps * self._speed))
         first.save(
             path, "WEBP", save_all=True, append_images=others, duration=duration, loop=0, method=2, quality=QUALITY
         )
 
     def _write_video(self, path: Path) -> bool:
         """Write all pictures as VP9, which is free of royalties; returns False where OpenCV cannot encode it."""
-        writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"vp09"), self.fps, self._size)
+        writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"vp09"), self.fps * self._speed, self._size)
         if not writer.isOpened():
             return False
         for i in tqdm(range(len(self._frames)), path.name, leave=False, disable=None):

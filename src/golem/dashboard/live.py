@@ -290,6 +290,9 @@ class LiveView(AbstractContextManager["LiveView", None]):
         floor = map_view(self._running.bus)
         if floor is not None:
             self._panel.show_picture("map", floor)
+        pack = bus.latest(topics.PACK_PLAN)
+        if pack is not None:
+            self._panel.show_picture("pack", pack.rgb)
         for camera, label in CAMERAS.items():
             picture = camera_picture(self._running, self._view, camera)
             height = round(CAMERA_WIDTH * picture.shape[0] / picture.shape[1])

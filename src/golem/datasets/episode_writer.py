@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from golem.datasets import schema
+from golem.datasets.own_priority import own_priority
 from golem.datasets.schema import DatasetError, Feature, Recipe, extra
 from golem.datasets.store import DatasetFolder
 from golem.datasets.swap import beside, held, link, replaced
@@ -57,6 +58,8 @@ class Video:
         self._stream = self._out.add_stream(CODEC, rate=fps, options={"crf": f"{CRF}", "g": f"{GOP}", "preset": "11"})
         self._stream.height, self._stream.width = feature.shape[:2]
         self._stream.pix_fmt = "yuv420p"
+        with own_priority():
+            self._stream.codec_context.open()
 
     def add(self, picture: NDArray[Any]) -> None:
         """Append one picture (height, width, 3)."""

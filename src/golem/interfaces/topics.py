@@ -82,6 +82,8 @@ CAMERAS_WANTED = Topic("cameras_wanted", tuple)
 """Names of cameras that somebody wants exposed though nothing is looked for: who records, or a policy."""
 REMOVALS = Topic("removals", str)
 """From a gantry that loosens fasteners: a sentence before each."""
+PACK_PLAN = Topic("pack/plan", payloads.Picture)
+"""From a job that takes a pack apart, whenever something happened to a fastener."""
 FEEDBACK = Topic("skill/feedback", payloads.Feedback)
 """Of the running skill."""
 ONBOARD_LEGS = Topic("onboard/legs", payloads.LegCommand)

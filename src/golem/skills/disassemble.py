@@ -16,13 +16,13 @@ from golem.skills.context import Context
 from golem.skills.disassemble_goal import DisassembleGoal, DisassembleReport
 from golem.skills.dock import DockReport
 from golem.skills.fastener_list import read_list
-from golem.skills.job_file import Fate, JobFile, PackFastener
+from golem.skills.job_file import JobFile, PackFastener
 from golem.skills.kept_file import KeptFileConfig, kept_file
 from golem.skills.pack_job import PackJob
+from golem.skills.pack_picture import COLOURS, OTHER
 from golem.skills.pick_config import PickOutcome, PickReport, Sight
 
 COLUMNS = "name class x y z said_loose fate reason tries hand tray stance robot_s date_utc picture".split()
-COLOURS = {Fate.IN_TRAY: "#2a2", Fate.OPEN: "#888", Fate.TIGHT: "#c80", Fate.JAMMED: "#c80"}
 SCALE = 400.0
 """Pixels per metre of the plan."""
 STYLE = "body{font:14px sans-serif}td,th{padding:2px 8px;text-align:left;vertical-align:top}img{height:60px}"
@@ -72,7 +72,7 @@ def _plan(book: JobFile) -> str:
     width, height = ((left - min(ys) + 0.05) * SCALE, (top - min(xs) + 0.05) * SCALE)
     dots = "".join(
         f'<circle cx="{(left - y) * SCALE:.0f}" cy="{(top - x) * SCALE:.0f}" r="6" '
-        f'fill="{COLOURS.get(one.fate, "#c22")}"><title>{escape(f"{one.listed.name}: {one.fate}")}</title></circle>'
+        f'fill="rgb{COLOURS.get(one.fate, OTHER)}"><title>{escape(f"{one.listed.name}: {one.fate}")}</title></circle>'
         for one, x, y in zip(book.fasteners, xs, ys, strict=True)
     )
     return f'<svg width="{width:.0f}" height="{height:.0f}">{dots}</svg>'

@@ -11,6 +11,7 @@ import numpy as np
 
 from golem.capabilities.navigation.goto import GoTo
 from golem.interfaces import topics
+from golem.interfaces.payloads import Picture
 from golem.middleware.bus import News
 from golem.skills.base import FAULT, REFUSED, SkillResult, StageFailed
 from golem.skills.context import Context
@@ -19,6 +20,7 @@ from golem.skills.dock import APPROACH, DockGoal, DockReport, approach
 from golem.skills.fastener_list import KINDS
 from golem.skills.job_file import TO_DO, Fate, JobFile, PackFastener
 from golem.skills.navigate import NavigateGoal
+from golem.skills.pack_picture import pack_picture
 from golem.skills.pack_plan import PackSides, PackStop, make_plan
 from golem.skills.pack_view import NOTHING, see_edge, see_fasteners
 from golem.skills.pick_config import PickGoal, PickOutcome, PickReport, Sight, Tried
@@ -137,6 +139,7 @@ class PackJob:
         self._rim = 0.0  # height of the pack's rim above base_link [m]
         self._off: Array = np.zeros(2)  # where the palm cameras see fasteners, from where the head camera does [m]
         self._full, self._strikes = set[str](), 0
+        self._stops: list[PackStop] = []
 
     async def run(self) -> SkillResult:
         """Take out what is open; return how it went.
@@ -198,7 +201,15 @@ class PackJob:
         stops = [[s.pose.x, s.pose.y, s.pose.yaw, *(number for number, _ in s.picks)] for s in plan]
         fates = [[*one.place.tolist(), one.fate.value] for one in self._book.fasteners]
         self._context.say("plan", text, stops=stops, fasteners=fates)
+        self._stops = plan
+        self._show()
         return plan
+
+    def _show(self) -> None:
+        """Let people see how far it is."""
+        book, at = self._book, self._gantry_at()
+        rgb = pack_picture(book.fasteners, book.containers, self._stops, self._T_pack_base, at)
+        self._context.publish(topics.PACK_PLAN, Picture(self._context.t, rgb))
 
     @property
     def _T_pack_base(self) -> PlanarPose:
@@ -352,6 +363,7 @@ class PackJob:
         """Keep what happened, on the disk, before anything else happens; live, another thread waits for the disk."""
         t = self._context.t
         await self._context.think(lambda: self._book.tell(one, fate, t, reason, side, tray, stance, picture), 0.0)
+        self._show()
         if fate is not Fate.TRYING:
             text = f"{one.listed.name}: {fate.value.replace('_', ' ')}. {reason}"
             self._context.say("job", text, number=one.number, fate=fate.value)
