@@ -95,6 +95,16 @@ def test_fixtures_are_where_and_as_large_as_the_layout_says(layout: Path) -> Non
     np.testing.assert_allclose(door[1], [0.4, 0.1, 0.8], atol=1e-6)
 
 
+def test_a_pad_that_is_left_open_takes_the_rest(layout: Path) -> None:
+    text = LAYOUT.replace("padding: [[0.1, 0.1], [-0.04, 0.0], [0, 0.1]]", "size: [1, 1, 2], padding: [[0.2, null]]")
+    layout.write_text(text.replace("[[0.2, null]]", "[[0.2, null], null, [null, 0.3]]"))
+    found = read_robocasa(RobocasaConfig(layout, "plain"))
+    fridge, house = (found[f"{name}_right_group"] for name in ("fridge", "house"))
+    # 0.2 and 0 beside it, 0.1 and 0.3 below and above; along the house's y it is in the middle.
+    middle = fridge.pos + (fridge.offset[1], -fridge.offset[0], fridge.offset[2])
+    np.testing.assert_allclose(middle - house.pos, [0.0, -0.1, -0.1], atol=1e-9)
+
+
 def test_a_robot_begins_before_the_free_counter_with_things_on_it(layout: Path) -> None:
     config = MujocoConfig(world="robocasa", robocasa=RobocasaConfig(layout, "plain"), support="ground")
     scene = build_scene(config, PackLayout(), load_profile("ideal"), 1)

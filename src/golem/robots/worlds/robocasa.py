@@ -9,7 +9,7 @@ What is sampled onto counters, stools, windows and things on walls are left out.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, cast
@@ -33,7 +33,6 @@ MODELS = (
     "fridge", "fridge_french_door", "fridge_side_by_side", "fridge_bottom_freezer", "stove", "stove_wide", "oven",
     "dishwasher", "microwave", "hood", "sink", "stovetop",
 )  # fmt: skip
-"""Kinds that have an MJCF."""
 LEFT_OUT = ("floor", "stool", "window", "window_proc", "wall_accessory", "utensil_rack")
 SIDES = (("left", "right"), ("front", "back"), ("bottom", "top"))
 """Words for the low and the high side along x, y, z."""
@@ -58,8 +57,7 @@ class RobocasaConfig:
     Attributes:
         layout: a layout's YAML file in a checkout, its assets downloaded.
         style: one of its kitchen styles, which names the models; by default the registry's first.
-        before: the counter before which the robot should stand, by its name and `_` and that of its group; by default
-            the first one that is wide enough and free.
+        before: the counter to stand before, its name, `_` and its group's; by default the first wide, whole, free one.
     """
 
     layout: Path | None = None
@@ -71,8 +69,7 @@ class RobocasaConfig:
 class Fixture:
     """A fixture: its kind, extent, place of its origin [m] and heading [rad] in the kitchen, and boxes around it.
 
-    `offset` (3,) is the middle of its extent, in its own frame [m]; `rank` of a counter that one can stand before is 1,
-    and 2 where nothing is let into it.
+    `offset` (3,) is the extent's middle in its own frame [m]; `rank` is 1 of a wide counter, 2 where it is whole.
     """
 
     kind: str
@@ -94,9 +91,12 @@ def read_robocasa(config: RobocasaConfig) -> dict[str, Fixture]:
     assets = next((above for above in layout.resolve().parents if (above / ROOT).is_dir()), None)
     if assets is None:
         raise ConfigError(f"The layout '{layout}' is in no checkout of RoboCasa: no folder above it has {ROOT}.")
-    groups = _mapping(layout)
+    known = {path.stem: path for path in sorted((assets / "scenes" / "kitchen_styles").rglob("*.yaml"))}
+    if config.style not in ("", *known):
+        raise unknown_name("kitchen style", config.style, known)
+    groups, style = _mapping(layout), _mapping(known[config.style]) if config.style else {}
     try:
-        return _Reader(assets, _style(assets, config.style)).read(groups)
+        return _Reader(assets, style).read(groups)
     except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
         raise ConfigError(f"The layout '{layout}' is none of RoboCasa's: {type(error).__name__} {error}.") from error
 
@@ -171,15 +171,6 @@ def _mapping(path: Path) -> dict[str, Any]:
     return cast("dict[str, Any]", found)
 
 
-def _style(assets: Path, name: str) -> dict[str, Any]:
-    if not name:
-        return {}
-    known = {path.stem: path for path in sorted((assets / "scenes" / "kitchen_styles").rglob("*.yaml"))}
-    if name not in known:
-        raise unknown_name("kitchen style", name, known)
-    return _mapping(known[name])
-
-
 class _Reader:
     """Places fixtures one after the other, each beside those before it."""
 
@@ -199,8 +190,10 @@ class _Reader:
                 if kind != "wall" or not row.get("backing"):
                     self.found[f"{row['name']}_{group}"] = f = self._fixture(row, kind, group)
                     mine.append(f)
-            if "group_pos" in lists:
-                _turn([f for f in mine if f.kind != "wall"], lists)
+            turn, origin = float(lists.get("group_z_rot", 0.0)), np.array([*lists.get("group_origin", (0, 0)), 0.0])
+            for f in (f for f in mine if f.kind != "wall" and "group_pos" in lists):
+                f.pos = rotation_rpy(0.0, 0.0, turn) @ (f.pos - origin) + (*lists["group_pos"], 0.0)
+                f.yaw += turn
         return {name: f for name, f in self.found.items() if np.isfinite(f.pos).all()}
 
     def _fixture(self, row: Row, kind: str, group: str) -> Fixture:
@@ -214,6 +207,8 @@ class _Reader:
         if kind == "housing_cabinet" and inner is not None:
             pads = np.array([p or (0.0, 0.0) for p in row.get("padding") or (None,) * 3], float)
             size = [inner.size[k] + pads[k].sum() if x is None else x for k, x in enumerate(size)]
+            rest = (np.array(size, float) - inner.size)[:, None] - pads[:, ::-1]
+            pads = np.nan_to_num(np.where(np.isnan(pads), rest, pads))
         f = self._model(row, kind, size) if kind in MODELS else _boxed(row, kind, np.array(size, float))
         if not np.isfinite(f.size).all() or (f.size <= 0.0).any():
             raise ValueError(f"{row['name']} has no size")
@@ -251,14 +246,6 @@ class _Reader:
                 "assets first (python -m robocasa.scripts.download_kitchen_assets)."
             )
         return _boxed(row, kind, np.array(size, float))
-
-
-def _turn(fixtures: list[Fixture], group: Row) -> None:
-    """Turn the fixtures of a group about its origin, and move them."""
-    origin, turn = np.array([*group.get("group_origin", (0.0, 0.0)), 0.0], float), float(group.get("group_z_rot", 0.0))
-    for f in fixtures:
-        f.pos = rotation_rpy(0.0, 0.0, turn) @ (f.pos - origin) + (*group["group_pos"], 0.0)
-        f.yaw += turn
 
 
 def _beside(f: Fixture, row: Row, other: Fixture) -> Array:
@@ -301,8 +288,7 @@ def _boxed(row: Row, kind: str, size: Array) -> Fixture:
     h, t = 0.5 * size, BOARD
     boxes = [_between(-h, h)]
     if kind in OPEN:
-        ends = [(k, sign) for k, sign in ((0, -1.0), (0, 1.0), (1, 1.0), (2, -1.0), (2, 1.0))]
-        boxes = [_between(*_slice(-h, h, k, sign, t)) for k, sign in ends]
+        boxes = [_between(*_slice(-h, h, k, s, t)) for k, s in ((0, -1.0), (0, 1.0), (1, 1.0), (2, -1.0), (2, 1.0))]
     elif kind == "stack":
         boxes.append(_between(np.array([-h[0], RECESS - h[1], -h[2] - PLINTH]), np.array([h[0], h[1], -h[2]])))
     elif kind == "counter":
@@ -324,7 +310,9 @@ def _scaled(kind: str, size: list[float | None], path: Path) -> Fixture:
     """Return a fixture with the collision shapes of an MJCF as boxes, scaled to `size` where that is told."""
     try:
         spec = mujoco.MjSpec.from_file(str(path))
-        for element in _needless(spec):
+        seen = [g for g in spec.geoms if g.type == mujoco.mjtGeom.mjGEOM_MESH or g.contype == 0]
+        moves = (*spec.actuators, *spec.sensors, *spec.equalities, *spec.tendons, *spec.joints)
+        for element in (*seen, *moves, *spec.materials, *spec.textures, *spec.meshes):
             spec.delete(element)
         for geom in spec.geoms:
             geom.material = ""
@@ -338,15 +326,6 @@ def _scaled(kind: str, size: list[float | None], path: Path) -> Fixture:
     told = [None if x is None else x / extent[k] for k, x in enumerate(size)]
     order = ((0, 2, 1), (1, 0, 2), (2, 0, 1))
     scale = np.array([next((told[j] for j in turn if told[j] is not None), 1.0) for turn in order], float)
-    boxes: list[Box] = []
-    for g in range(model.ngeom):
-        half = np.abs(data.geom_xmat[g].reshape(3, 3)) @ model.geom_aabb[g, 3:]
-        boxes.append((scale * data.geom_xpos[g], scale * half))
+    turned = np.abs(data.geom_xmat.reshape(-1, 3, 3)) @ model.geom_aabb[:, 3:, None]
+    boxes: list[Box] = [(scale * x, scale * half[:, 0]) for x, half in zip(data.geom_xpos, turned, strict=True)]
     return Fixture(kind, scale * extent, boxes, offset=scale * (at["p0"] + 0.5 * extent))
-
-
-def _needless(spec: mujoco.MjSpec) -> Iterator[Any]:
-    """Yield what of a model is only seen or moves: its shapes stay where they are while all is shut."""
-    yield from (g for g in spec.geoms if g.type == mujoco.mjtGeom.mjGEOM_MESH or g.contype == 0)
-    yield from (*spec.actuators, *spec.sensors, *spec.equalities, *spec.tendons, *spec.joints)
-    yield from (*spec.materials, *spec.textures, *spec.meshes)
