@@ -253,7 +253,7 @@ def test_the_table_of_slots_is_complete() -> None:
     assert shown == {slot: registry.names(slot) for slot in SLOTS}
 
 
-def test_the_readme_names_every_module() -> None:
-    rows = re.findall(r"^\| `(\w+)` \| (`.*?) \|", (DOCS.parent / "README.md").read_text(encoding="utf-8"), re.M)
+def test_the_home_page_names_every_module() -> None:
+    rows = re.findall(r"^\| `(\w+)` \| (`.*?) \|", (DOCS / "index.md").read_text(encoding="utf-8"), re.M)
     shown = {slot: set(re.findall(r"`(\w+)`", re.sub(r"\(.*?\)", "", names))) for slot, names in rows if slot in SLOTS}
     assert shown == {slot: set(registry.names(slot)) for slot in SLOTS}
