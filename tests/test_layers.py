@@ -37,7 +37,7 @@ LAYERS = (
     ("agent",),
     ("evaluation", "dashboard", "doctor", "option_list"),
     ("datasets", "training"),
-    ("run", "demo", "demo_walk", "agent_command"),
+    ("run", "demo", "demo_pack", "demo_walk", "agent_command"),
     ("teleop",),
     ("cli", "__main__"),
 )

@@ -41,6 +41,7 @@ INSIDERS = (
     "cli.py",
     "run.py",
     "demo.py",
+    "demo_pack.py",
     "demo_walk.py",
     "doctor.py",
 )

@@ -1,8 +1,11 @@
-"""What a memory tells of itself on the bus."""
+"""What is told to people on the bus: of a memory, and in pictures."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,3 +56,16 @@ class RememberedPlaces:
 
     frame: str
     places: tuple[RememberedPlace, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ShownPicture:
+    """A picture for people.
+
+    Attributes:
+        t: time [s].
+        rgb: (height, width, 3) uint8.
+    """
+
+    t: float
+    rgb: NDArray[np.uint8]

@@ -365,19 +365,6 @@ class GateStatus:
 
 
 @dataclass(frozen=True, slots=True)
-class Picture:
-    """A picture for people.
-
-    Attributes:
-        t: time [s].
-        rgb: (height, width, 3) uint8.
-    """
-
-    t: float
-    rgb: NDArray[np.uint8]
-
-
-@dataclass(frozen=True, slots=True)
 class Feedback:
     """What a running skill says of itself.
 

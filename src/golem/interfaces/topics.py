@@ -6,7 +6,7 @@ from functools import cache
 
 from golem.interfaces import nav_payloads, payloads
 from golem.interfaces.lidar import ExternalOdometry, LidarImu, LidarScan
-from golem.interfaces.memory_payloads import MemoryStatus, RememberedPlaces
+from golem.interfaces.memory_payloads import MemoryStatus, RememberedPlaces, ShownPicture
 from golem.interfaces.unitree_api import ArmSdkCommand
 from golem.middleware.bus import Topic
 from golem.middleware.wire.api import ApiRequest, Response, request_topic, response_topic
@@ -82,7 +82,7 @@ CAMERAS_WANTED = Topic("cameras_wanted", tuple)
 """Names of cameras that somebody wants exposed though nothing is looked for: who records, or a policy."""
 REMOVALS = Topic("removals", str)
 """From a gantry that loosens fasteners: a sentence before each."""
-PACK_PLAN = Topic("pack/plan", payloads.Picture)
+PACK_PLAN = Topic("pack/plan", ShownPicture)
 """From a job that takes a pack apart, whenever something happened to a fastener."""
 FEEDBACK = Topic("skill/feedback", payloads.Feedback)
 """Of the running skill."""

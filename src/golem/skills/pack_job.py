@@ -11,7 +11,7 @@ import numpy as np
 
 from golem.capabilities.navigation.goto import GoTo
 from golem.interfaces import topics
-from golem.interfaces.payloads import Picture
+from golem.interfaces.memory_payloads import ShownPicture
 from golem.middleware.bus import News
 from golem.skills.base import FAULT, REFUSED, SkillResult, StageFailed
 from golem.skills.context import Context
@@ -209,7 +209,7 @@ class PackJob:
         """Let people see how far it is."""
         book, at = self._book, self._gantry_at()
         rgb = pack_picture(book.fasteners, book.containers, self._stops, self._T_pack_base, at)
-        self._context.publish(topics.PACK_PLAN, Picture(self._context.t, rgb))
+        self._context.publish(topics.PACK_PLAN, ShownPicture(self._context.t, rgb))
 
     @property
     def _T_pack_base(self) -> PlanarPose:
