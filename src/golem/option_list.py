@@ -106,7 +106,7 @@ def options_of(cls: type[Any], supplied: tuple[str, ...] = (), default: Any = No
             continue
         optional = type(None) in typing.get_args(hint)
         kind = "mapping or off" if optional else "mapping"
-        yield Option(name, kind, {None: "off", REQUIRED: REQUIRED}.get(_plain(value), ""), text)
+        yield Option(name, kind, "off" if value is None else REQUIRED if value == REQUIRED else "", text)
         for option in options_of(inner, default=value if isinstance(value, inner) else None):
             yield dataclasses.replace(option, name=f"{name}.{option.name}")
 
@@ -201,7 +201,3 @@ def _shown(value: Any) -> str:
     if value is None:
         return "off"
     return f"{value:g}" if isinstance(value, float) else str(value)
-
-
-def _plain(value: Any) -> Any:
-    return value if value is None or value == REQUIRED else ""

@@ -173,7 +173,12 @@ class Desk:
         while self._recent and self._recent[0] < now - 1.0:
             self._recent.popleft()
         known = call.tool if call.tool in self.tools else shorten(repr(call.tool))
-        self._tell("call", call, tool=known, arguments=_sized(call.arguments))
+        self._tell(
+            "call",
+            call,
+            tool=known,
+            arguments=call.arguments if _size(call.arguments) <= LARGEST else {"more than": LARGEST},
+        )
         try:
             if call.tool != "stop":
                 if len(self._recent) >= self.rules.calls:
@@ -369,7 +374,3 @@ def _size(value: Any) -> int:
         elif isinstance(each, list | tuple):
             left += each[: LARGEST // 8 + 1]
     return size
-
-
-def _sized(value: Any) -> Any:
-    return value if _size(value) <= LARGEST else {"more than": LARGEST}

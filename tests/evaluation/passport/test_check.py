@@ -18,8 +18,7 @@ from golem.capabilities.legs.description import SHIPPED, shipped
 from golem.capabilities.legs.passports.read import read_passport
 from golem.capabilities.legs.policy import Policy, PolicyConfig
 from golem.errors import ConfigError
-from golem.evaluation.passport.check import check_passport, numbers
-from golem.evaluation.passport.policy_command import PolicyCheckConfig, run_policy_check
+from golem.evaluation.passport.policy_command import PolicyCheckConfig, check_passport, numbers, run_policy_check
 
 Data = dict[str, Any]
 Write = Callable[[Path], Path]

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import tyro
 from rich.console import Console
@@ -69,7 +69,7 @@ def run_check(config: CheckConfig) -> bool:
 
 
 def _keep(reports: list[Report], config: CheckConfig) -> None:
-    text = json.dumps([_plain(report) for report in reports], indent=2)
+    text = json.dumps([asdict(report) | {"passed": report.passed} for report in reports], indent=2)
     if config.json:
         print(text)
     if config.save is not None:
@@ -115,10 +115,6 @@ def _wanted(config: CheckConfig) -> list[tuple[str, str]]:
         return [(config.slot, config.use)]
     slots = [config.slot] if config.slot else list(SUITES)
     return [(slot, use) for slot in slots for use in registry.names(slot) if use not in UNCHECKED.get(slot, ())]
-
-
-def _plain(report: Report) -> dict[str, Any]:
-    return asdict(report) | {"passed": report.passed}
 
 
 def _print(console: Console, report: Report, whole: bool) -> None:

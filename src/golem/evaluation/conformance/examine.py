@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import signal
 import threading
 from collections.abc import Callable, Generator, Iterator, Mapping
@@ -10,7 +9,7 @@ from contextlib import contextmanager
 from importlib import import_module
 from time import thread_time as cpu_now
 from types import FrameType
-from typing import Any, cast
+from typing import cast
 
 from golem import registry
 from golem.errors import ConfigError, MissingExtra, MissingSystemLibrary, ModuleFault, unknown_name
@@ -112,12 +111,7 @@ def candidate(slot: str, use: str) -> Candidate:
     name, options = choice_of(use)
     options = options or OPTIONS.get(slot, {}).get(name, {})
     registry.load(slot, name)
-    make = functools.partial(_make, suite, slot, name, options)
-    return Candidate(slot, name, make)
-
-
-def _make(suite: Suite, slot: str, name: str, options: Mapping[str, object]) -> Any:
-    return registry.create(slot, name, options, **suite.context())
+    return Candidate(slot, name, lambda: registry.create(slot, name, options, **suite.context()))
 
 
 def choice_of(use: str) -> tuple[str, Mapping[str, object]]:

@@ -45,7 +45,7 @@ class OdometrySuite(Suite):
 
     def inputs(self) -> Sequence[Tenth]:
         """Return a robot that stands and sets out."""
-        return _walk()
+        return list(_readings())
 
     def edges(self) -> Mapping[str, Sequence[Tenth]]:
         """Return a gap, scans without points, without end, of another clock, frozen ones, and none."""
@@ -55,7 +55,7 @@ class OdometrySuite(Suite):
             "no scan at all": [_scans(x, lambda s: None) for x in walk],
             "scans without points": [_scans(x, _empty) for x in walk],
             "a scan of another clock": [_scans(x, lambda s: replace(s, t=s.t + 1e6)) for x in walk],
-            "the same scan again and again": [(*x, *_of(walk[17], LidarScan)) for x in walk],
+            "the same scan again and again": [(*x, *(r for r in walk[17] if isinstance(r, LidarScan))) for x in walk],
             "no IMU": [tuple(r for r in x if not isinstance(r, LidarImu)) for x in walk],
             "no legs": [tuple(r for r in x if not isinstance(r, LegOdometry)) for x in walk],
         }
@@ -166,14 +166,6 @@ class OdometrySuite(Suite):
 @lru_cache(maxsize=1)
 def _readings() -> tuple[Tenth, ...]:
     return tuple(tuple(tenth) for tenth in MadeWalk(ROOM, every=5).tenths(SECONDS))
-
-
-def _walk() -> list[Tenth]:
-    return list(_readings())
-
-
-def _of(tenth: Tenth, kind: type[LidarScan]) -> tuple[LidarScan, ...]:
-    return tuple(reading for reading in tenth if isinstance(reading, kind))
 
 
 def _scans(tenth: Tenth, change: Any) -> Tenth:

@@ -219,7 +219,10 @@ def relocation(rng: np.random.Generator, setting: Setting) -> Relocation:
         looks += _walk(rng, room, setting, start)
         start = looks[-1].frame.t + pause
     split, moved_at = len(looks), start - pause / 2
-    screens = (_before(spots[0][0], float(counters[0]) * np.pi / 2),) if setting.hidden else ()
+    heading = float(counters[0]) * np.pi / 2
+    # 16 cm before it, as seen from the middle of the room.
+    before = spots[0][0] - 0.16 * np.array([np.cos(heading), np.sin(heading), 0.0])
+    screens = (before,) if setting.hidden else ()
     after = (Thing(target, spots[1][0]), *others)
     looks += _walk(rng, RelocationRoom(after, clutter, screens, setting.dusk), setting, start)
     before = (Thing(target, spots[0][0]), *others)
@@ -255,11 +258,6 @@ def _spots(rng: np.random.Generator, counter: int, count: int) -> list[Array]:
             places.append(np.array([*local, 2.0 * COUNTER[2]]))
     turn = Rotation.from_euler("z", counter * np.pi / 2)
     return [turn.apply(place + (AROUND, 0.0, 0.0)) for place in places]
-
-
-def _before(place: Array, heading: float) -> Array:
-    """Return the place 0.16 m before an object, as seen from the middle of the room."""
-    return place - 0.16 * np.array([np.cos(heading), np.sin(heading), 0.0])
 
 
 def _walk(rng: np.random.Generator, room: RelocationRoom, setting: Setting, start: float) -> list[Observation]:

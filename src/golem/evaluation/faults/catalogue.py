@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from golem.evaluation.faults.class_faults import KNEE, LYING, by_imu, class_faults, scaled, turned
+from golem.evaluation.faults.class_faults import KNEE, LYING, class_faults, scaled
 from golem.evaluation.faults.command_faults import JOINTS, LIMITS, command_faults
 from golem.evaluation.faults.data_faults import data_faults
 from golem.evaluation.faults.rig import Expect, FaultMoment, FaultSource, Frames, Injection, by_command, by_state
+from golem.evaluation.faults.spoils import by_imu, second_writer, set_to, shifted, turned, weak
 from golem.interfaces.payloads import Reason
-from golem.middleware.wire.convert import encode_low_command
 from golem.robots.model.table import JOINT_INDEX
-from golem.types import NUM_JOINTS, LowCommand, LowState
+from golem.types import NUM_JOINTS
 
 
 def combined_faults() -> Iterator[Injection]:
@@ -25,22 +25,14 @@ def combined_faults() -> Iterator[Injection]:
     yield from _while_stopped()
 
 
-def _error(m: FaultMoment, image: Any) -> None:
-    image["motor"]["motorstate"][KNEE] = 1
-
-
-def _hot(m: FaultMoment, image: Any) -> None:
-    image["motor"]["temperature"][KNEE] = 180
-
-
-def _off(m: FaultMoment, image: Any) -> None:
-    image["motor"]["mode"][KNEE] = 0
+def _knee(field: str, value: int) -> dict[str, Any]:
+    return {"state": by_state(set_to(value, "motor", field, KNEE))}
 
 
 HARD: dict[str, tuple[tuple[Reason, ...], dict[str, Any]]] = {
-    "a knee reports an error": ((Reason.MOTOR,), {"state": by_state(_error)}),
-    "a knee at 180 degrees": ((Reason.MOTOR_HOT,), {"state": by_state(_hot)}),
-    "a knee says it is off": ((Reason.MOTOR_MODE,), {"state": by_state(_off)}),
+    "a knee reports an error": ((Reason.MOTOR,), _knee("motorstate", 1)),
+    "a knee at 180 degrees": ((Reason.MOTOR_HOT,), _knee("temperature", 180)),
+    "a knee says it is off": ((Reason.MOTOR_MODE,), _knee("mode", 0)),
     "no state": ((Reason.STATE_STALE,), {"state": lambda m, p: []}),
     "truncated states": ((Reason.STATE_DAMAGED,), {"state": lambda m, p: [p[:-8]]}),
     "IMU upside down": (
@@ -51,18 +43,9 @@ HARD: dict[str, tuple[tuple[Reason, ...], dict[str, Any]]] = {
 """Faults after which nobody stands, and their reasons."""
 
 
-def _unstamped(m: FaultMoment, image: Any) -> None:
-    image["reserve"][0] = 0
-
-
-def _second(m: FaultMoment, rig: Any) -> None:
-    if "writer" not in m.kept:
-        m.kept["writer"] = rig.writer("/safety/lowcmd_in")
-
-
 SOFT: dict[str, dict[str, Any]] = {
-    "second writer": {"gate": _second},
-    "no stamp": {"command": by_command(_unstamped)},
+    "second writer": {"gate": second_writer("/safety/lowcmd_in")},
+    "no stamp": {"command": by_command(set_to(0, "reserve", 0))},
     "no command": {"command": lambda m, p: []},
     "damaged commands": {"command": lambda m, p: [p[:-8]]},
 }
@@ -88,29 +71,12 @@ def _while_stopped() -> Iterator[Injection]:
             f"{hard} while stopped", FaultSource.DEVICE, Expect.STOP1, reasons, 1.25, command=lambda m, p: [], **late
         )
 
-    def dead(m: FaultMoment, c: LowCommand) -> LowCommand:
-        gain = np.where((np.arange(NUM_JOINTS) == KNEE) & (m.t > 1.0), 0.0, 1.0)
-        return replace(c, kp=c.kp * gain, kd=c.kd * gain, tau=c.tau * gain)
-
-    def spike(m: FaultMoment, s: LowState) -> LowState:
-        q = s.q.copy()
-        q[KNEE] += 0.5 * (m.k % 60 == 0 and m.t > 1.0)
-        return replace(s, q=q)
-
     silent: dict[str, Any] = {"command": lambda m, p: [], "lasting": 3.0}
     stale = (Reason.COMMAND_STALE,)
-    yield Injection(
-        "a knee without torque while stopped", FaultSource.DEVICE, Expect.SAFE, (*stale, *LYING), motors=dead, **silent
-    )
-    yield Injection(
-        "a knee jumps in 1 of 60 states while stopped",
-        FaultSource.DEVICE,
-        Expect.SAFE,
-        stale,
-        stands=True,
-        senses=spike,
-        **silent,
-    )
+    dead = weak(KNEE, lambda m: 0.0 if m.t > 1.0 else 1.0)
+    yield _safe("a knee without torque while stopped", (*stale, *LYING), motors=dead, **silent)
+    spike = shifted(KNEE, lambda m: 0.5 * (m.k % 60 == 0 and m.t > 1.0))
+    yield _safe("a knee jumps in 1 of 60 states while stopped", stale, stands=True, senses=spike, **silent)
 
     def again(m: FaultMoment, rig: Any) -> None:
         if m.k % 10 == 0:
@@ -139,7 +105,7 @@ def _while_stopped() -> Iterator[Injection]:
         (Reason.MOTOR,),
         0.25,
         lasting=1.2,
-        state=by_state(lambda m, image: _error(m, image) if m.t < 0.1 else None),
+        state=by_state(lambda m, image: set_to(1, "motor", "motorstate", KNEE)(m, image) if m.t < 0.1 else None),
         gate=again,
     )
 
@@ -156,24 +122,15 @@ def _stop(name: str, reasons: tuple[Reason, ...], within: float = 0.006, **more:
     return Injection(name, FaultSource.DEVICE, Expect.STOP, reasons, within, **more)
 
 
+def _safe(name: str, reasons: tuple[Reason, ...], **more: Any) -> Injection:
+    return Injection(name, FaultSource.DEVICE, Expect.SAFE, reasons, **more)
+
+
 def _motors() -> Iterator[Injection]:
     for joint in JOINTS:
         i = JOINT_INDEX[joint]
-
-        def dead(m: FaultMoment, command: LowCommand, i: int = i) -> LowCommand:
-            arrays = {name: getattr(command, name).copy() for name in ("tau", "kp", "kd")}
-            for array in arrays.values():
-                array[i] = 0.0
-            return replace(command, **arrays)
-
-        yield Injection(
-            f"{joint} without torque",
-            FaultSource.DEVICE,
-            Expect.SAFE,
-            (Reason.MOTOR_DEAD, *LIMITS),
-            motors=dead,
-            stands=i >= 13,
-        )
+        dead = weak(i, lambda m: 0.0)
+        yield _safe(f"{joint} without torque", (Reason.MOTOR_DEAD, *LIMITS), motors=dead, stands=i >= 13)
 
     def changed(m: FaultMoment, rig: Any) -> None:
         rig.machine = 7
@@ -199,29 +156,12 @@ def _estop() -> Iterator[Injection]:
 
 def _writers() -> Iterator[Injection]:
     for topic in ("/safety/lowcmd_in", "/lowcmd", "/lowstate"):
-
-        def second(m: FaultMoment, rig: Any, topic: str = topic) -> None:
-            if "writer" not in m.kept:
-                m.kept["writer"] = rig.writer(topic)
-
         stands = topic != "/lowstate"
-        yield _stop(f"second writer of {topic}", (Reason.WRITERS,), 0.052, gate=second, stands=stands)
-
-    def writes(topic: str) -> Callable[[FaultMoment, Any], None]:
-        def write(m: FaultMoment, rig: Any) -> None:
-            if "writer" not in m.kept:
-                m.kept["writer"] = rig.writer(topic)
-            q = np.full(NUM_JOINTS, 0.3)
-            zeros, ones = np.zeros(NUM_JOINTS), np.ones(NUM_JOINTS)
-            command = LowCommand(rig.t, q, zeros, zeros, 200.0 * ones, 2.0 * ones)
-            m.kept["writer"].write(encode_low_command(command, 0, answers=rig.t))
-
-        return write
-
+        yield _stop(f"second writer of {topic}", (Reason.WRITERS,), 0.052, gate=second_writer(topic), stands=stands)
     both = (Reason.WRITERS, Reason.NOT_IN_CONTROL)
-    yield _stop("a second stack that commands", both, 0.052, gate=writes("/safety/lowcmd_in"), stands=True)
+    yield _stop("a second stack that commands", both, 0.052, gate=second_writer("/safety/lowcmd_in", True), stands=True)
     # Its commands are overtaken by the gate's within the tick; that they come is said all the same.
-    yield _stop("a second gate that commands", (Reason.NOT_IN_CONTROL,), 0.052, gate=writes("/lowcmd"))
+    yield _stop("a second gate that commands", (Reason.NOT_IN_CONTROL,), 0.052, gate=second_writer("/lowcmd", True))
 
 
 def _gate() -> Iterator[Injection]:

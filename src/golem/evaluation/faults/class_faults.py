@@ -10,11 +10,11 @@ import numpy as np
 
 from golem.evaluation.faults.command_faults import JOINTS, LIMITS, PARTS, SENDER, TORQUE
 from golem.evaluation.faults.rig import Edit, Expect, FaultMoment, FaultSource, Injection, by_command, by_state
+from golem.evaluation.faults.spoils import Senses, by_imu, set_to, shifted, turned, weak
 from golem.interfaces.payloads import Reason
 from golem.robots.model.table import JOINT_INDEX
-from golem.types import LEGS, NUM_JOINTS, Array, Imu, LowCommand, LowState
+from golem.types import LEGS, LowState
 
-Senses = Callable[[FaultMoment, LowState], LowState]
 KNEE = 3
 BALANCE = (*SENDER, *LIMITS, Reason.BALANCE, Reason.COMMAND_HUNG)
 LYING = (
@@ -131,17 +131,6 @@ def _senders() -> Iterator[Injection]:
         )
 
 
-def by_imu(change: Callable[[FaultMoment, Imu], Imu]) -> Senses:
-    """Return what a fault makes of the IMU as the robot measures."""
-    return lambda m, state: replace(state, imu=change(m, state.imu))
-
-
-def turned(axis: int, angle: float, quat: Array) -> Array:
-    """Return `quat` (4,) wxyz, turned by `angle` [rad] about a world axis."""
-    w, v = np.cos(angle / 2), np.sin(angle / 2) * np.eye(3)[axis]
-    return np.concatenate(([w * quat[0] - v @ quat[1:]], w * quat[1:] + quat[0] * v + np.cross(v, quat[1:])))
-
-
 def _lies() -> Iterator[Injection]:
     def lie(name: str, senses: Senses, seconds: float = 4.0) -> Injection:
         return Injection(f"state: {name}", FaultSource.DATA, Expect.SAFE, LYING, lasting=seconds, senses=senses)
@@ -169,19 +158,17 @@ def _lies() -> Iterator[Injection]:
         for gain in (-1.0, 0.5):
             scale = np.where(np.arange(3) == axis, gain, 1.0)
             yield lie(f"gyro's {word} rate times {gain:g}", by_imu(lambda m, u, k=scale: replace(u, gyro=u.gyro * k)))
+
+    def stuck(m: FaultMoment, s: LowState, i: int) -> LowState:
+        q, dq = s.q.copy(), s.dq.copy()
+        q[i], dq[i] = m.kept.setdefault("q", float(s.q[i])), 0.0
+        return replace(s, q=q, dq=dq)
+
     for joint in JOINTS:
         i = JOINT_INDEX[joint]
-
-        def changed(m: FaultMoment, s: LowState, i: int = i, rate: float = 0.0, stuck: bool = False) -> LowState:
-            q, dq = s.q.copy(), s.dq.copy()
-            q[i] += rate * m.t
-            if stuck:
-                q[i], dq[i] = m.kept.setdefault("q", float(s.q[i])), 0.0
-            return replace(s, q=q, dq=dq)
-
         for rate in (0.03, -0.05):
-            yield lie(f"{joint} drifts by {rate:g} rad/s", lambda m, s, c=changed, r=rate: c(m, s, rate=r), 6.0)
-        yield lie(f"{joint} stuck", lambda m, s, c=changed: c(m, s, stuck=True))
+            yield lie(f"{joint} drifts by {rate:g} rad/s", shifted(i, lambda m, r=rate: r * m.t), 6.0)
+        yield lie(f"{joint} stuck", lambda m, s, i=i: stuck(m, s, i))
 
 
 def _reports() -> Iterator[Injection]:
@@ -202,13 +189,10 @@ def _reports() -> Iterator[Injection]:
                 if field == "temperature" and "frame" in when:
                     continue  # no motor cools down in 2 ms
 
-                def edit(m: FaultMoment, image: Any, i: int = JOINT_INDEX[joint], f: str = field, v: int = value,
-                         now: Callable[[int], bool] = now) -> None:  # fmt: skip
-                    if now(m.k):
-                        image["motor"][f][i] = v
-
+                edit = set_to(value, "motor", field, JOINT_INDEX[joint])
+                spoil = by_state(lambda m, image, edit=edit, now=now: edit(m, image) if now(m.k) else None)
                 name = f"state: {joint} {what} {when}"
-                yield Injection(name, FaultSource.DATA, Expect.STOP, (reason,), 0.2, state=by_state(edit))
+                yield Injection(name, FaultSource.DATA, Expect.STOP, (reason,), 0.2, state=spoil)
 
 
 def _gate() -> Iterator[Injection]:
@@ -237,18 +221,11 @@ def _gate() -> Iterator[Injection]:
         "no base estimate", FaultSource.DEVICE, Expect.SAFE, (Reason.BASE_STALE,), stands=True, gate=no_estimate
     )
 
-    def weak(share: float) -> Callable[[FaultMoment, LowCommand], LowCommand]:
-        def motors(m: FaultMoment, c: LowCommand) -> LowCommand:
-            gain = np.where(np.arange(NUM_JOINTS) == KNEE, share, 1.0)
-            return replace(c, kp=c.kp * gain, kd=c.kd * gain, tau=c.tau * gain)
-
-        return motors
-
     for share in (0.15, 0.5):
         yield Injection(
             f"a knee gives {100 * share:g} % of its torque",
             FaultSource.DEVICE,
             Expect.SAFE,
             (*LIMITS, Reason.MOTOR_DEAD, Reason.BALANCE),
-            motors=weak(share),
+            motors=weak(KNEE, lambda m, s=share: s),
         )

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from golem.evaluation.faults.rig import Expect, FaultMoment, FaultSource, Frames, Injection, by_command, edited_command
+from golem.evaluation.faults.spoils import frame_faults, set_to
 from golem.interfaces.payloads import Reason
 from golem.robots.model.table import JOINT_INDEX, load_limits
 from golem.types import LEGS, NUM_JOINTS, UPPER
@@ -40,11 +42,8 @@ def command_faults() -> Iterator[Injection]:
     yield from _times()
 
 
-def _set(field: str, part: slice, value: Callable[[FaultMoment], Any]) -> Callable[[FaultMoment, bytes], Frames]:
-    def edit(m: FaultMoment, image: Any) -> None:
-        image["motor"][field][part] = value(m)
-
-    return by_command(edit)
+def _set(field: str, part: slice, value: Any) -> Callable[[FaultMoment, bytes], Frames]:
+    return by_command(set_to(value, "motor", field, part))
 
 
 def _stop(name: str, reasons: tuple[Reason, ...], within: float = 0.006, **more: Any) -> Injection:
@@ -64,34 +63,16 @@ def _damaged() -> Iterator[Injection]:
     for joint in JOINTS:
         i = JOINT_INDEX[joint]
         for field, value in (("q", np.nan), ("tau", np.inf), ("kd", -np.inf)):
-            spoil = _set(field, slice(i, i + 1), lambda m, v=value: v)
-            yield _stop(f"{field} {value} {joint}", INVALID, command=spoil)
-        spoil = _set("q", slice(i, i + 1), lambda m: 1e7)
-        yield _stop(f"q 1e7 {joint}", INVALID, command=spoil)
-
-    def flipped(m: FaultMoment, payload: bytes) -> bytes:
-        wrong = bytearray(payload)
-        wrong[100] ^= 1
-        return bytes(wrong)
-
-    yield _bear("checksum wrong once", command=lambda m, p: [flipped(m, p) if m.k == 0 else p])
-    yield _bear("checksum wrong in 1 of 100", command=lambda m, p: [flipped(m, p) if m.k % 100 == 0 else p])
-    yield _stop("checksum wrong in 1 of 5", DAMAGED, 0.05, command=lambda m, p: [p if m.k % 5 else flipped(m, p)])
-    yield _stop("checksum always wrong", DAMAGED, command=lambda m, p: [flipped(m, p)])
-    yield _bear("truncated once", command=lambda m, p: [p[:-8] if m.k == 0 else p])
-    yield _stop("truncated", DAMAGED, command=lambda m, p: [p[:-8]])
+            yield _stop(f"{field} {value} {joint}", INVALID, command=_set(field, slice(i, i + 1), value))
+        yield _stop(f"q 1e7 {joint}", INVALID, command=_set("q", slice(i, i + 1), 1e7))
+    yield from frame_faults("command", 100, partial(_stop, reasons=DAMAGED), _bear)
     yield _stop("too long", DAMAGED, command=lambda m, p: [p + bytes(8)])
-    yield _stop("random bytes", DAMAGED, command=lambda m, p: [p[:4] + m.rng.bytes(len(p) - 4)])
     yield _bear(
         "random bytes beside the sound ones once",
         command=lambda m, p: [p[:4] + m.rng.bytes(64), p] if m.k == 0 else [p],
     )
     for word, value in (("mode_pr", 1), ("mode_machine", 7)):
-
-        def edit(m: FaultMoment, image: Any, word: str = word, value: int = value) -> None:
-            image[word] = value
-
-        yield _stop(f"{word} {value}", DAMAGED, command=by_command(edit))
+        yield _stop(f"{word} {value}", DAMAGED, command=by_command(set_to(value, word)))
 
 
 def _gains() -> Iterator[Injection]:
@@ -110,11 +91,11 @@ def _gains() -> Iterator[Injection]:
 
         yield _stop(f"mode 0 of {part}", limp, command=by_command(off))
         yield _stop(f"zero gains of {part}", limp, command=by_command(zero))
-        yield _stop(f"kp -100 of {part}", limp, command=_set("kp", where, lambda m: -100.0))
-        yield _stop(f"kd -20 of {part}", limp, command=_set("kd", where, lambda m: -20.0))
-        yield _stop(f"kd 0 of {part}", limp, command=_set("kd", where, lambda m: 0.0))
-        yield _safe(f"kp 1e5 of {part}", command=_set("kp", where, lambda m: 1e5))
-        yield _safe(f"kd 1e5 of {part}", command=_set("kd", where, lambda m: 1e5))
+        yield _stop(f"kp -100 of {part}", limp, command=_set("kp", where, -100.0))
+        yield _stop(f"kd -20 of {part}", limp, command=_set("kd", where, -20.0))
+        yield _stop(f"kd 0 of {part}", limp, command=_set("kd", where, 0.0))
+        yield _safe(f"kp 1e5 of {part}", command=_set("kp", where, 1e5))
+        yield _safe(f"kd 1e5 of {part}", command=_set("kd", where, 1e5))
     yield _bear("one command without gains", command=lambda m, p: [edited_command(p, _limp) if m.k == 0 else p])
 
 
@@ -126,7 +107,7 @@ def _limp(image: Any) -> None:
 def _motion() -> Iterator[Injection]:
     """Commands that any motor obeys, and that nobody should give."""
     for part, where in PARTS.items():
-        yield _safe(f"tau 1000 of {part}", command=_set("tau", where, lambda m: 1e3))
+        yield _safe(f"tau 1000 of {part}", command=_set("tau", where, 1e3))
         yield _stop(
             f"tau +-1000 each tick of {part}",
             (*SENDER, *LIMITS),
@@ -135,18 +116,16 @@ def _motion() -> Iterator[Injection]:
         )
         yield _safe(f"tau +-1000 at 10 Hz of {part}", command=_set("tau", where, lambda m: 1e3 * (-1) ** (m.k // 25)))
         full = TORQUE[where]
-        yield _safe(f"tau at its limit of {part}", command=_set("tau", where, lambda m, tau=full: tau))
+        yield _safe(f"tau at its limit of {part}", command=_set("tau", where, full))
         yield _safe(
             f"tau at its limits at 10 Hz of {part}",
             command=_set("tau", where, lambda m, tau=full: tau * (-1) ** (m.k // 25)),
         )
-        yield _safe(
-            f"q 1 rad beyond its range of {part}", command=_set("q", where, lambda m, q=UPPERMOST[where] + 1.0: q)
-        )
-        yield _safe(f"dq at its limit of {part}", command=_set("dq", where, lambda m, dq=SPEED[where]: dq))
-        yield _safe(f"q 10 rad of {part}", command=_set("q", where, lambda m: 10.0))
-        yield _safe(f"q -10 rad of {part}", command=_set("q", where, lambda m: -10.0))
-        yield _safe(f"dq 100 of {part}", command=_set("dq", where, lambda m: 100.0))
+        yield _safe(f"q 1 rad beyond its range of {part}", command=_set("q", where, UPPERMOST[where] + 1.0))
+        yield _safe(f"dq at its limit of {part}", command=_set("dq", where, SPEED[where]))
+        yield _safe(f"q 10 rad of {part}", command=_set("q", where, 10.0))
+        yield _safe(f"q -10 rad of {part}", command=_set("q", where, -10.0))
+        yield _safe(f"dq 100 of {part}", command=_set("dq", where, 100.0))
         for size, period in ((0.5, 1), (0.02, 1), (0.5, 50)):
 
             def shake(m: FaultMoment, image: Any, where: slice = where, size: float = size, n: int = period) -> None:
@@ -172,9 +151,7 @@ def _times() -> Iterator[Injection]:
     for late in (10, 30, 90):
         yield Injection(f"{late} ms late", FaultSource.COMMAND, Expect.SAFE, stale, command=_late(late // 2))
     yield _stop("150 ms late", stale, 0.106, command=_late(75))
-    yield _bear("half lost", command=lambda m, p: [p] if m.k % 2 else [])
     yield _stop("all but 1 of 70 lost", stale, 0.15, command=lambda m, p: [p] if m.k % 70 == 69 else [])
-    yield _bear("every frame twice", command=lambda m, p: [p, p])
     yield _bear("every frame twenty times", command=lambda m, p: [p] * 20)
     yield _bear("in pairs the wrong way round", command=_reordered)
 

@@ -121,7 +121,7 @@ class LiveFault:
     """One fault."""
 
     name: str
-    inject: Callable[[LiveRobot], None]
+    inject: Callable[[LiveRobot], object]
     reasons: frozenset[Reason]
     restore: Callable[[LiveRobot], None] = lambda robot: None
 
@@ -133,7 +133,7 @@ def _damping() -> bytes:
 _RNG = np.random.default_rng(0)
 WRITERS = frozenset({Reason.WRITERS, Reason.NOT_IN_CONTROL})
 FAULTS: tuple[LiveFault, ...] = (
-    LiveFault("operator asks for a stop", lambda r: _ask(r, "stop"), frozenset({Reason.REQUESTED})),
+    LiveFault("operator asks for a stop", lambda r: r.link.ask("stop"), frozenset({Reason.REQUESTED})),
     LiveFault("e-stop pressed", lambda r: r.press(True), frozenset({Reason.ESTOP_PRESSED}), lambda r: r.press(False)),
     LiveFault("a stranger writes /lowcmd", lambda r: r.write("/lowcmd", _damping), WRITERS),
     LiveFault(
@@ -167,10 +167,6 @@ FAULTS: tuple[LiveFault, ...] = (
     ),
 )
 """What is tried, in this order; after them the gate is killed."""
-
-
-def _ask(robot: LiveRobot, what: str) -> None:
-    robot.link.ask(what)
 
 
 def run_live_faults(config: LiveFaultsConfig) -> bool:

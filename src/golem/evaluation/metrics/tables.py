@@ -141,7 +141,9 @@ def metric_differences(summary: Summary) -> TextTable | None:
             _label(name),
             f"{short[c.a]} {MINUS} {short[c.b]}",
             *_values(c.case),
-            *_difference(c.metrics[name], metric(name)),
+            str((d := c.metrics[name]).n),
+            f"{(m := metric(name)).scale * d.mean:+.3g}",
+            _interval(d.interval, m.scale, "+"),
         )
         for name in _measured([c.metrics for c in summary.comparisons])
         for c in summary.comparisons
@@ -195,10 +197,6 @@ def _figures(d: Distribution, m: Metric) -> tuple[str, ...]:
         _interval(d.mean_interval, m.scale),
         *(number(x, m) for x in (d.rms, d.p95_size, d.minimum, d.maximum)),
     )
-
-
-def _difference(d: PairedMean, m: Metric) -> tuple[str, ...]:
-    return str(d.n), f"{m.scale * d.mean:+.3g}", _interval(d.interval, m.scale, "+")
 
 
 def number(value: float, m: Metric) -> str:

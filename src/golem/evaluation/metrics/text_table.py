@@ -33,7 +33,9 @@ class TextTable:
 
     def markdown(self) -> str:
         """Return the table in Markdown, padded so that it can be read as it is."""
-        lines = [tuple(_cell(cell) for cell in line) for line in (self.columns, *self.rows)]
+        lines = [
+            tuple(cell.replace("|", "\\|").replace("\n", " ") for cell in line) for line in (self.columns, *self.rows)
+        ]
         widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
         figures = self.figures
         rule = tuple(
@@ -95,7 +97,3 @@ def short_names(methods: Iterable[str]) -> dict[str, str]:
 
 def _latex(text: str) -> str:
     return "".join(_LATEX.get(c, c) for c in text)
-
-
-def _cell(text: str) -> str:
-    return text.replace("|", "\\|").replace("\n", " ")

@@ -202,7 +202,9 @@ def _actions(d: Description) -> Iterator[Repair]:
     q = d.q0()
     flipped = q.copy()
     flipped[LEGS] *= -1.0
-    postures = {said: _both(values) for said, values in POSTURES.items()} | {"the negative": flipped[LEGS]}
+    postures = {said: np.tile(np.array(values, np.float64), 2) for said, values in POSTURES.items()} | {
+        "the negative": flipped[LEGS]
+    }
     for said, legs in postures.items():
         q[LEGS] = legs
         yield Repair("offset", "posture", f"the default posture is {said}", replace(d, posture=tuple(q.tolist())))
@@ -212,10 +214,6 @@ def _actions(d: Description) -> Iterator[Repair]:
         yield Repair("gains", "kd", f"damping is {f:g} times as large", replace(d, kd=tuple((kd * f).tolist())))
     for said, (stiff, damp) in GAINS.items():
         yield Repair("gains", "kp", f"the gains are {said}", replace(d, kp=tuple(stiff), kd=tuple(damp)))
-
-
-def _both(leg: Sequence[float]) -> Array:
-    return np.array([*leg, *leg], dtype=np.float64)
 
 
 def _history(d: Description) -> Iterator[Repair]:

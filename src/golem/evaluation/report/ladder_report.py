@@ -201,7 +201,9 @@ def render(result: LadderResult) -> str:
             comparisons=[table for table in (all_cases(summary), comparisons(summary)) if table],
             paper=any((first.rung, method) in PAPER for method in summary.methods),
             map={} if rung.adaptive else _map(records, summary),
-            failure_plots=_failures(summary) if failed else [],
+            failure_plots=[
+                (f"by {kind[:-1]}", failure_plot(summary, kind)) for kind in ("stages", "modules") if failed
+            ],
             adaptive=rung.adaptive,
             time_plots=[(name.replace("_", " "), time_plot(name, grouped)) for name in times],
             metrics=[] if rung.adaptive else [t for t in (metrics(summary), metric_differences(summary)) if t],
@@ -214,10 +216,6 @@ def render(result: LadderResult) -> str:
             traces=any(r.trace for r in lost),
             show=f"{config.command()} --show {trial_name(lost[0])}" if lost else "",
         )
-
-
-def _failures(summary: Summary) -> list[tuple[str, str]]:
-    return [("by stage", failure_plot(summary, "stages")), ("by module", failure_plot(summary, "modules"))]
 
 
 def _says(r: TrialRecord) -> str:

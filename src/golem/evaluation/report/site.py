@@ -68,7 +68,9 @@ def run_publish(config: PublishConfig) -> Path:
         for cell in study.cells:
             for method in cell.methods:
                 _method_page(study, cell, method, config.out)
-    index = write_file(config.out / "index.html", _page(studies, _link, files, ""))
+    index = write_file(
+        config.out / "index.html", _page(studies, lambda s, c, m: f"{s.name}/{c.name}/{_slug(c, m)}.html", files, "")
+    )
     trials = sum(len(cell.records) for study in studies for cell in study.cells)
     print(f"Site: {index}, {trials} trials.")
     return index
@@ -122,10 +124,6 @@ def _board(study: Study, cell: CellResult, link: Any) -> dict[str, Any]:
     search = " The next case follows from results, so the share of the trials says nothing." if cell.adaptive else ""
     says = f"Rung {first.rung}, profile {first.profile}, seed {first.seed}{', ' + options if options else ''}.{search}"
     return {"name": cell.name, "says": says, "methods": sorted(rows, key=lambda row: -row["rate"])}
-
-
-def _link(study: Study, cell: CellResult, method: str) -> str:
-    return f"{study.name}/{cell.name}/{_slug(cell, method)}.html"
 
 
 def _slug(cell: CellResult, method: str) -> str:

@@ -272,7 +272,7 @@ def follow(spec: TrialSpec, walk: RecordedWalk) -> TrialOutcome:
     distance = float(steps.sum())
     series = {
         "yaw_drift": math.remainder(way[2] - true[2], 2.0 * math.pi),
-        "gap": _longest(stale[judged]) * TICK,
+        "gap": int(np.max(np.diff(true_runs(stale[judged])), initial=0)) * TICK,
         "distance": distance,
     }
     for name, chosen in (("velocity_standing", ~walk.stepping), ("velocity_walking", walk.stepping)):
@@ -326,7 +326,3 @@ def _way(T: Array, first: int, last: int) -> Array:
     c, s = math.cos(yaw[0]), math.sin(yaw[0])
     x, y = T[last, :2, 3] - T[first, :2, 3]
     return np.array([c * x + s * y, c * y - s * x, yaw[1] - yaw[0]])
-
-
-def _longest(flags: Array) -> int:
-    return int(np.max(np.diff(true_runs(flags)), initial=0))

@@ -71,7 +71,7 @@ def run_grasp_bench(config: GraspBenchConfig) -> list[Figure]:
             table.add_row(use, thing, f"{1e3 * np.median(times):.1f}", f"{count:g}", f"{centred}/{config.n}")
             figures.append(figure(f"{use}, {thing}", times, 1e3, "ms", REFERENCES.get(use, "")))
             if isinstance(method, Scorer):
-                times = _ranking_alone(method, given, answers)
+                times = timed(lambda i, m=method, a=answers, g=given: m.scored(g[i], a[i]), len(given))
                 table.add_row("scorer alone", thing, f"{1e3 * np.median(times):.1f}", f"{count:g}", "")
                 figures.append(figure(f"scorer alone, {thing}", times, 1e3, "ms", REFERENCES["scorer alone"]))
     console.print(table)
@@ -88,11 +88,6 @@ def _measure(
         answers.append(method.propose(given[i], given[i].points, gripper))
 
     return timed(propose, len(given)), answers
-
-
-def _ranking_alone(scorer: Scorer, given: Sequence[LocalizedObject], answers: Sequence[list[Grasp]]) -> Array:
-    """Return the times (n,) that the network takes for proposals that are there [s]."""
-    return timed(lambda i: scorer.scored(given[i], answers[i]), len(given))
 
 
 def _gripper(thing: str) -> Gripper:
