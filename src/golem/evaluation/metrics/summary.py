@@ -12,18 +12,7 @@ from typing import Any
 
 from golem.evaluation.base import Case, case_name
 from golem.evaluation.harness.records import TrialRecord
-from golem.evaluation.metrics.statistics import (
-    Distribution,
-    Interval,
-    PairedTable,
-    clustered,
-    distribution,
-    holm,
-    mcnemar,
-    mean_interval,
-    paired_difference,
-    wilson,
-)
+from golem.evaluation.metrics import statistics as stats
 from golem.package_data import load_data
 
 
@@ -100,10 +89,10 @@ class MethodSummary:
     case: Case
     n: int
     successes: int
-    interval: Interval
-    times: dict[str, Distribution]
-    metrics: dict[str, Distribution]
-    costs: dict[str, Distribution]
+    interval: stats.Interval
+    times: dict[str, stats.Distribution]
+    metrics: dict[str, stats.Distribution]
+    costs: dict[str, stats.Distribution]
     stages: dict[str, int]
     modules: dict[str, int]
 
@@ -119,7 +108,7 @@ class PairedMean:
 
     n: int
     mean: float
-    interval: Interval | None
+    interval: stats.Interval | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,8 +128,8 @@ class Comparison:
     a: str
     b: str
     case: Case
-    table: PairedTable
-    difference: Interval
+    table: stats.PairedTable
+    difference: stats.Interval
     p: float
     p_holm: float
     metrics: dict[str, PairedMean]
@@ -154,7 +143,7 @@ class Pooled:
     n: int
     successes: int
     scenes: int
-    interval: Interval
+    interval: stats.Interval
 
 
 @dataclass(frozen=True, slots=True)
@@ -233,16 +222,18 @@ def pooled(method: str, records: Sequence[TrialRecord]) -> Pooled | None:
         return None
     won = [sum(scene) for scene in scenes.values()]
     n = sum(map(len, scenes.values()))
-    return Pooled(method, n, sum(won), len(scenes), clustered(list(scenes.values())))
+    return Pooled(method, n, sum(won), len(scenes), stats.clustered(list(scenes.values())))
 
 
 def comparisons_of(pairs: Sequence[tuple[Sequence[TrialRecord], Sequence[TrialRecord]]]) -> tuple[Comparison, ...]:
     """Return the paired tests of records, each pair of the same case and the same indices in the same order."""
-    tables = [PairedTable.count([r.success for r in a], [r.success for r in b]) for a, b in pairs]
-    ps = [mcnemar(table) for table in tables]
+    tables = [stats.PairedTable.count([r.success for r in a], [r.success for r in b]) for a, b in pairs]
+    ps = [stats.mcnemar(table) for table in tables]
     return tuple(
-        Comparison(a[0].method, b[0].method, a[0].case, table, paired_difference(table), p, adjusted, _paired(a, b))
-        for (a, b), table, p, adjusted in zip(pairs, tables, ps, holm(ps), strict=True)
+        Comparison(
+            a[0].method, b[0].method, a[0].case, table, stats.paired_difference(table), p, adjusted, _paired(a, b)
+        )
+        for (a, b), table, p, adjusted in zip(pairs, tables, ps, stats.holm(ps), strict=True)
     )
 
 
@@ -265,7 +256,7 @@ def row(records: Sequence[TrialRecord], costs: Sequence[Mapping[str, Any]] = ())
         records[0].case,
         len(records),
         successes,
-        wilson(successes, len(records)),
+        stats.wilson(successes, len(records)),
         _distributions([r.timings for r in records]),
         _distributions([r.series for r in records]),
         _distributions(timed),
@@ -274,9 +265,11 @@ def row(records: Sequence[TrialRecord], costs: Sequence[Mapping[str, Any]] = ())
     )
 
 
-def _distributions(rows: Sequence[Mapping[str, float]]) -> dict[str, Distribution]:
+def _distributions(rows: Sequence[Mapping[str, float]]) -> dict[str, stats.Distribution]:
     names = sorted({name for row in rows for name in row})
-    found = {name: distribution([row[name] for row in rows if name in row], *metric(name).bounds) for name in names}
+    found = {
+        name: stats.distribution([row[name] for row in rows if name in row], *metric(name).bounds) for name in names
+    }
     return {name: d for name, d in found.items() if d is not None}
 
 
@@ -293,8 +286,10 @@ def _paired(a: Sequence[TrialRecord], b: Sequence[TrialRecord]) -> dict[str, Pai
         share = metric(name).share
         if share and {value for pair in pairs for value in pair} <= {0.0, 1.0}:
             first, second = zip(*pairs, strict=True)
-            interval = paired_difference(PairedTable.count(*([x == 1.0 for x in side] for side in (first, second))))
+            interval = stats.paired_difference(
+                stats.PairedTable.count(*([x == 1.0 for x in side] for side in (first, second)))
+            )
         else:
-            interval = mean_interval(differences, *((-1.0, 1.0) if share else ()))
+            interval = stats.mean_interval(differences, *((-1.0, 1.0) if share else ()))
         found[name] = PairedMean(len(pairs), sum(differences) / len(pairs), interval)
     return found

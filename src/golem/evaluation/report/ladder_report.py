@@ -19,15 +19,7 @@ from golem.evaluation.metrics.statistics import Interval, wilson
 from golem.evaluation.metrics.summary import NO_MODULE, MethodSummary, Summary, summarise
 from golem.evaluation.metrics.tables import all_cases, comparisons, metric_differences, metrics, rates
 from golem.evaluation.metrics.text_table import short_names
-from golem.evaluation.report.margin_plot import (
-    MAX_CURVES,
-    MarginBox,
-    MarginCurve,
-    kept_traces,
-    margin_box,
-    margin_boxes,
-    margin_plot,
-)
+from golem.evaluation.report import margin_plot as margins
 from golem.evaluation.report.svg_figure import (
     COLOUR,
     cause_colour,
@@ -209,7 +201,7 @@ def render(result: LadderResult) -> str:
             metrics=[] if rung.adaptive else [t for t in (metrics(summary), metric_differences(summary)) if t],
             margin_boxes=boxes,
             margin_plots=plots,
-            max_curves=MAX_CURVES,
+            max_curves=margins.MAX_CURVES,
             pictures=_pictures(grouped, result.out),
             films=_films(lost, result.out),
             lost=[_row(r, result.out) for r in lost],
@@ -264,16 +256,18 @@ def _map(records: Sequence[TrialRecord], summary: Summary) -> dict[str, list[tup
 
 def _margins(grouped: Mapping[str, Sequence[TrialRecord]], folder: Path) -> tuple[list[tuple[str, str]], str]:
     """Return the CoM margin over time, per method, of the trials that kept a trace, and boxes of its means."""
-    plots, boxes, short = list[tuple[str, str]](), list[MarginBox](), short_names(grouped)
+    plots, boxes, short = list[tuple[str, str]](), list[margins.MarginBox](), short_names(grouped)
     for i, (method, rows) in enumerate(grouped.items()):
-        kept = kept_traces(rows, folder)
-        plot = margin_plot([MarginCurve(trace, r.success) for r, trace in kept[:MAX_CURVES]], i)
+        kept = margins.kept_traces(rows, folder)
+        plot = margins.margin_plot(
+            [margins.MarginCurve(trace, r.success) for r, trace in kept[: margins.MAX_CURVES]], i
+        )
         if plot:
             plots.append((short[method], plot))
-        box = margin_box(short[method], [trace for _, trace in kept], i)
+        box = margins.margin_box(short[method], [trace for _, trace in kept], i)
         if box is not None:
             boxes.append(box)
-    return plots, margin_boxes(boxes)
+    return plots, margins.margin_boxes(boxes)
 
 
 def _pictures(grouped: Mapping[str, Sequence[TrialRecord]], folder: Path) -> list[dict[str, Any]]:

@@ -15,18 +15,8 @@ from scipy.spatial.transform import Rotation
 from golem import registry
 from golem.capabilities.odometry.base import LidarOdometry, OdometryEstimate
 from golem.evaluation.base import DONE, Rung, TrialOutcome, TrialSpec
+from golem.evaluation.episodes import lidar_walk
 from golem.evaluation.episodes.episode import legs_stack
-from golem.evaluation.episodes.lidar_walk import (
-    START,
-    LidarWalk,
-    PoseTrack,
-    Route,
-    ate,
-    end_error,
-    nees,
-    range_and_bearing,
-    record_walk,
-)
 from golem.interfaces import lidar_convert, public
 from golem.interfaces.lidar import ExternalOdometry, LegOdometry, LidarImu, LidarScan
 from golem.middleware.bags.base import BagMessage
@@ -49,7 +39,7 @@ NO_COVARIANCE: Array = np.zeros((6, 6))
 class WalkBag:
     """One bag. Times are the robot's: log times begin where the walk does."""
 
-    def __init__(self, folder: Path, walk: LidarWalk) -> None:
+    def __init__(self, folder: Path, walk: lidar_walk.LidarWalk) -> None:
         """Begin the bag `folder` for `walk`.
 
         Raises:
@@ -115,7 +105,7 @@ class Condition:
         gap: times between which no scan comes [s].
     """
 
-    route: Route
+    route: lidar_walk.Route
     ate: float = np.inf
     end: float = np.inf
     share: float = np.inf
@@ -185,7 +175,7 @@ class OdometryRung(Rung[OdometryOptions]):
         """Let the robot walk once, and odometries hear what its sensors said under each condition."""
         first = specs[0]
         condition = _condition(first)
-        walk = record_walk(
+        walk = lidar_walk.record_walk(
             condition.route,
             first.index,
             seed=first.seed,
@@ -225,7 +215,7 @@ class Followed:
     why: str = ""
 
 
-def readings(walk: LidarWalk, spec: TrialSpec) -> Iterator[Reading]:
+def readings(walk: lidar_walk.LidarWalk, spec: TrialSpec) -> Iterator[Reading]:
     """Yield what the sensors said on a walk under the condition of a trial, in the order of arrival."""
     condition = _condition(spec)
     mount = None
@@ -239,7 +229,7 @@ def readings(walk: LidarWalk, spec: TrialSpec) -> Iterator[Reading]:
             yield reading
 
 
-def kept(heard: Iterator[Reading], walk: LidarWalk, folder: Path) -> Iterator[Reading]:
+def kept(heard: Iterator[Reading], walk: lidar_walk.LidarWalk, folder: Path) -> Iterator[Reading]:
     """Yield what was `heard`, and write it into a bag.
 
     Raises:
@@ -252,7 +242,7 @@ def kept(heard: Iterator[Reading], walk: LidarWalk, folder: Path) -> Iterator[Re
             yield reading
 
 
-def follow(walk: LidarWalk, heard: Iterator[Reading], methods: Sequence[str]) -> dict[str, Followed]:
+def follow(walk: lidar_walk.LidarWalk, heard: Iterator[Reading], methods: Sequence[str]) -> dict[str, Followed]:
     """Let new odometries follow a walk by what was `heard`, all at once; return what became of each."""
     contracts = {method: ContractCheck(SLOT, method) for method in methods}
     modules: dict[str, LidarOdometry] = {method: _make(_choice(method)) for method in methods}
@@ -282,7 +272,7 @@ def follow(walk: LidarWalk, heard: Iterator[Reading], methods: Sequence[str]) ->
     return found
 
 
-def judge(spec: TrialSpec, walk: LidarWalk, found: Followed) -> TrialOutcome:
+def judge(spec: TrialSpec, walk: lidar_walk.LidarWalk, found: Followed) -> TrialOutcome:
     """Return how well an odometry followed."""
     module = f"{SLOT}: {spec.method}"
     cpu = found.cpu or [0.0]
@@ -290,10 +280,10 @@ def judge(spec: TrialSpec, walk: LidarWalk, found: Followed) -> TrialOutcome:
     if not found.told:
         detail = found.why or "It never said anything."
         return TrialOutcome(False, "silent", module, detail, costs=costs)
-    condition, track = _condition(spec), PoseTrack.of(found.told).anchored(START)
-    end, height, heading = end_error(track)
+    condition, track = _condition(spec), lidar_walk.PoseTrack.of(found.told).anchored(lidar_walk.START)
+    end, height, heading = lidar_walk.end_error(track)
     series = {
-        "ate": ate(track),
+        "ate": lidar_walk.ate(track),
         "end_error": end,
         "end_height": height,
         "end_heading": heading,
@@ -301,10 +291,10 @@ def judge(spec: TrialSpec, walk: LidarWalk, found: Followed) -> TrialOutcome:
         "drift": end / max(walk.distance, 1e-9),
         "frames_lost": float(found.silent),
     }
-    split = range_and_bearing(track)
+    split = lidar_walk.range_and_bearing(track)
     if split is not None:
         series["end_range"], series["end_bearing"] = split
-    honest = nees(track, START)
+    honest = lidar_walk.nees(track, lidar_walk.START)
     if honest is not None:
         series["nees_place"], series["nees_heading"] = honest
     note = f"; the walk ended early: {walk.lost}" if walk.lost else ""

@@ -91,12 +91,7 @@ ROW = 0.29
 
 
 def timeline_plot(episodes: Mapping[str, tuple[Sequence[ObjectTimeline], int]], figure: Any) -> None:
-    """Draw one axis per episode, a row per object, looks from left to right.
-
-    Args:
-        episodes: title -> its rows, and how many looks there were before the move.
-        figure: of matplotlib; its height is set.
-    """
+    """Draw one axis per episode, a row per object, looks from left to right."""
     rows = sum(len(found) for found, _ in episodes.values())
     figure.set_figheight(ROW * rows + 0.75 * len(episodes) + 0.7)
     ratios = [len(found) + 0.6 for found, _ in episodes.values()]

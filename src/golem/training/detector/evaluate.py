@@ -22,10 +22,6 @@ SIZE = (1000, 420)
 def draw_curve(curve: Path, out: Path) -> None:
     """Draw average precision over crops seen, per class, one panel per camera.
 
-    Args:
-        curve: the CSV file that `train` writes; its columns `ap_CAMERA_CLASS` are drawn.
-        out: the PNG file.
-
     Raises:
         MissingExtra: matplotlib is not installed.
     """

@@ -22,11 +22,6 @@ from golem.training.legs.export_policy import TRAINED, graph_of, load_actor
 def average(networks: Sequence[Path], weights: Sequence[float], out: Path) -> None:
     """Write the weighted mean of exported networks to `out`, with what trained each of them.
 
-    Args:
-        networks: files that `export` or this wrote, of the same task.
-        weights: one per network, not negative; only their ratios count.
-        out: the network to write, `.onnx`.
-
     Raises:
         ConfigError: a file is no such network, the weights do not fit, or `out` is no name of a network.
     """

@@ -65,10 +65,6 @@ class Curve:
 def draw_curves(runs: Sequence[Path], out: Path) -> None:
     """Draw what the run folders' curves say, one colour a run, over millions of steps, and tabulate every fifth update.
 
-    Args:
-        runs: folders of training runs, or TABLE.csv:RUN for one of an earlier table.
-        out: the PNG file; the table is the CSV file beside it.
-
     Raises:
         MissingExtra: matplotlib is not installed.
         ConfigError: more runs than colours, two of one name, no such curve, `out` is no PNG file, or the table would
