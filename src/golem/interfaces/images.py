@@ -285,7 +285,6 @@ class Pairing:
     """Puts the two images of each exposure of one camera together, in whichever order they come."""
 
     def __init__(self, take: Callable[[Image, Image], None]) -> None:
-        """Give colour and depth with equal stamps to `take`."""
         self._take = take
         self._color: Image | None = None
         self._depth: Image | None = None

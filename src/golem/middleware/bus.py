@@ -66,7 +66,6 @@ class Bus:
     """Latest-value streams by topic."""
 
     def __init__(self) -> None:
-        """Start with no streams."""
         self._now: dict[str, Any] = {}
         self._count: dict[str, int] = {}
         self._pending: dict[str, deque[tuple[float, object]]] = {}
@@ -164,7 +163,6 @@ class News(Generic[T]):
     """Reads one topic so that no value is taken twice."""
 
     def __init__(self, bus: Bus, topic: Topic[T]) -> None:
-        """Begin now: what was delivered before does not count."""
         self._bus, self._topic = bus, topic
         self._seen = bus.count(topic)
 

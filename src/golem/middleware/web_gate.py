@@ -185,7 +185,6 @@ class _Waiting:
         return head
 
     def close(self) -> None:
-        """End every connection that waits."""
         for connection in self._heads:
             connection.close()
         self._selector.close()

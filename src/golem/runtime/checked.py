@@ -33,7 +33,6 @@ class CheckedGraspMethod:
     """
 
     def __init__(self, method: GraspMethod, contract: ContractCheck) -> None:
-        """Watch `method`."""
         self._method, self._contract = method, contract
         self.latency = contract.number("latency", method.latency, minimum=0.0)
 
@@ -62,7 +61,6 @@ class CheckedServoLaw:
     """A `ServoLaw` whose faults name the module."""
 
     def __init__(self, law: ServoLaw, contract: ContractCheck) -> None:
-        """Watch `law`."""
         self._law, self._contract = law, contract
         self.label = law.label
         self.patience = contract.number("patience", law.patience, minimum=0.0)
@@ -83,7 +81,6 @@ class CheckedSeeingLaw(CheckedServoLaw):
     """A `SeeingLaw` whose faults name the module."""
 
     def __init__(self, law: SeeingLaw, contract: ContractCheck) -> None:
-        """Watch `law`."""
         super().__init__(law, contract)
         self.cameras, self.width, self._see = law.cameras, law.width, law.see
 
@@ -102,7 +99,6 @@ class CheckedPlanner:
     """
 
     def __init__(self, planner: ArmPlanner, contract: ContractCheck) -> None:
-        """Watch `planner`."""
         self._planner, self._contract = planner, contract
         self.latency = contract.number("latency", planner.latency, minimum=0.0)
 
@@ -125,7 +121,6 @@ class CheckedProperties:
     """
 
     def __init__(self, source: PropertySource, contract: ContractCheck) -> None:
-        """Watch `source`."""
         self._source, self._contract = source, contract
         self.latency = contract.number("latency", source.latency, minimum=0.0)
 
@@ -143,7 +138,6 @@ class CheckedMemory:
     """
 
     def __init__(self, memory: Memory, contract: ContractCheck) -> None:
-        """Watch `memory`."""
         self._memory, self._contract, self._turn = memory, contract, threading.Lock()
 
     @property
@@ -230,7 +224,6 @@ class CheckedNavigator:
     """
 
     def __init__(self, navigator: Navigator, contract: ContractCheck) -> None:
-        """Watch `navigator`."""
         self._navigator, self._contract = navigator, contract
         self.rate = contract.number("rate", navigator.rate, minimum=MIN_RATE)
         self.latency = contract.number("latency", navigator.latency, minimum=0.0)

@@ -40,7 +40,6 @@ class CallTimes:
     """
 
     def __init__(self) -> None:
-        """Measure nothing until `allowed` is set."""
         self.allowed = math.inf
         self._calls = self._measured = self._slow = 0
         self._sum = 0.0

@@ -33,7 +33,6 @@ class EstopReport:
     """
 
     def __init__(self) -> None:
-        """Start with nothing heard."""
         self.pressed = self.released = False
         self._said = ""
         self._frames = 0

@@ -134,7 +134,6 @@ class _Entry:
         self._set_due()
 
     def skip(self, tick: int) -> None:
-        """Leave out every step that was due before `tick`."""
         if self.due < tick:
             self.k = math.ceil(tick / self.period - 1e-6)
             self._set_due()

@@ -70,7 +70,6 @@ def _named(words: list[str], properties: dict[str, Schema]) -> list[str]:
 
 
 def _dataclass(name: str, schema: Schema) -> type[Any]:
-    """Return a dataclass of what `schema` describes."""
     rows: list[tuple[str, Any, Any]] = []
     # Those without default come first, which a dataclass demands.
     for key, of in sorted(schema["properties"].items(), key=lambda item: "default" in item[1]):
@@ -87,7 +86,6 @@ def _dataclass(name: str, schema: Schema) -> type[Any]:
 
 
 def _hint(name: str, of: Schema) -> Any:
-    """Return the type hint of a field."""
     if "enum" in of:
         return Literal[tuple(of["enum"])]
     if "anyOf" in of:

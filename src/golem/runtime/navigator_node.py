@@ -26,7 +26,6 @@ class BusNav2:
     """See `golem.capabilities.navigation.nav2.Nav2Link`."""
 
     def __init__(self, bus: Bus) -> None:
-        """Speak over `bus`."""
         self._bus, self._number = bus, 0
         self._twists = News(bus, topics.NAV2_TWIST)
 

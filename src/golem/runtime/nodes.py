@@ -116,7 +116,6 @@ class EstimatorNode:
     period = TICK
 
     def __init__(self, bus: Bus, estimator: BaseEstimator, contract: ContractCheck) -> None:
-        """Run `estimator`."""
         self._bus, self._estimator, self._contract = bus, estimator, contract
         contract.times.allowed = self.period
         self._started = False
@@ -159,7 +158,6 @@ class UpperBodyNode:
     """
 
     def __init__(self, bus: Bus, arms: UpperBody, contract: ContractCheck) -> None:
-        """Run `arms`."""
         self._bus, self._arms, self._contract = bus, arms, contract
         self._latency = contract.number("latency", arms.latency, minimum=0.0)
         self.period = 1.0 / contract.number("rate", arms.rate, minimum=MIN_RATE)
@@ -202,7 +200,6 @@ class UpperBodyNode:
         return newest and trajectory.t > self._stopped_at and len(trajectory.times) > 0
 
     def _to_palms(self, targets: PalmTargets | None, state: LowState, base: BaseEstimate) -> ArmCommand:
-        """Return what the controller wants."""
         if self._followed is not None:
             self._followed = None
             start = np.concatenate((state.q[: UPPER.start], self._follower.q))
@@ -231,7 +228,6 @@ class HandNode:
     period = 0.01
 
     def __init__(self, bus: Bus, hand: HandController, side: Side, contract: ContractCheck) -> None:
-        """Run `hand` on `side`."""
         self._bus, self._hand, self._contract = bus, hand, contract
         contract.times.allowed = self.period
         self._side: Side = side
@@ -287,7 +283,6 @@ class ServoNode:
     period = TICK
 
     def __init__(self, bus: Bus, servo: MotorServo, contract: ContractCheck) -> None:
-        """Run `servo`."""
         self._bus, self._servo, self._contract = bus, servo, contract
         contract.times.allowed = self.period
 
@@ -333,7 +328,6 @@ class SkillNode:
     period = 0.01
 
     def __init__(self, context: Context) -> None:
-        """Serve `context` to the skills."""
         self._context = context
         self._faults = News(context.bus, topics.MODULE_FAULT)
         self.run: SkillRun | None = None

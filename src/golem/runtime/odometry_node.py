@@ -114,7 +114,6 @@ class MapperNode:
     wakes = topics.SCAN, topics.MAP_SAVE
 
     def __init__(self, bus: Bus, mapper: Mapper, contract: ContractCheck) -> None:
-        """Run `mapper`."""
         self._bus, self._mapper, self._contract = bus, mapper, contract
         self._every = 1.0 / contract.number("rate", mapper.rate, minimum=0.1)
         self._scans = News(bus, topics.SCAN)
@@ -150,7 +149,6 @@ class MapperNode:
             self._bus.publish(topics.MAP, grid, t)
 
     def _kept(self, path: str) -> MapFile:
-        """Write the map, and say how that went."""
         stored = self._contract.call(self._mapper.stored)
         if stored is None:
             return MapFile(path, "There is no map yet.")

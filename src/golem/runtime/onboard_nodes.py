@@ -44,7 +44,6 @@ class BusOnboard:
     """The on-board computer behind the bus; see `vendor.Onboard`."""
 
     def __init__(self, bus: Bus) -> None:
-        """Speak over `bus`."""
         self._bus = bus
         self._news: dict[str, News[Response]] = {}
 

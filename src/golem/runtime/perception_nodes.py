@@ -137,7 +137,6 @@ class LocalizerNode:
         self._tell(lambda: self._locate(frame, labels), labels, t)
 
     def _wanted(self) -> tuple[str, ...]:
-        """Return the labels that a skill looks for now."""
         request = self._bus.latest(topics.detection_request(self._camera))
         return () if request is None else request.labels
 

@@ -49,11 +49,6 @@ class SkillResult:
     trace: str | None = None
 
     def __post_init__(self) -> None:
-        """Check what is sent to others as it is.
-
-        Raises:
-            TypeError: it holds something else than it says above.
-        """
         expect("success of a result", self.success, bool)
         for name in ("stage", "reason") if self.slot is None else ("stage", "slot", "reason"):
             expect(f"{name} of a result", getattr(self, name), str)

@@ -96,7 +96,6 @@ class HandInterface:
     """One gripper, as a skill commands and reads it."""
 
     def __init__(self, context: Context, side: Side) -> None:
-        """Speak for the hand on `side`."""
         self._context = context
         self._side: Side = side
 
@@ -133,7 +132,6 @@ class LegsInterface:
     """The lower body, as a skill commands and reads it."""
 
     def __init__(self, context: Context) -> None:
-        """Speak for the legs."""
         self._context = context
 
     @property

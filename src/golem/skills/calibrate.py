@@ -161,7 +161,6 @@ class Calibrate:
     Result = CalibrateReport
 
     def __init__(self, config: KeptFileConfig | None = None) -> None:
-        """Keep calibrations in the folder of `config`."""
         self.config = config or KeptFileConfig()
 
     def timeout(self, goal: CalibrateGoal) -> float:

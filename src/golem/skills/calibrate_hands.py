@@ -74,7 +74,6 @@ class CalibrateHands:
     Result = CalibrateHandsReport
 
     def __init__(self, config: KeptFileConfig | None = None) -> None:
-        """Keep calibrations in the folder of `config`."""
         self.config = config or KeptFileConfig()
 
     def timeout(self, goal: CalibrateHandsGoal) -> float:

@@ -87,7 +87,6 @@ class CalibrateLidar:
     Result = CalibrateLidarReport
 
     def __init__(self, config: KeptFileConfig | None = None) -> None:
-        """Keep calibrations in the folder of `config`."""
         self.config = config or KeptFileConfig()
 
     def timeout(self, goal: CalibrateLidarGoal) -> float:

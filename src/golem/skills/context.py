@@ -55,7 +55,6 @@ class Arm:
     """One arm: a commanded gripper pose in odom, moved along lines or towards a moving goal."""
 
     def __init__(self, context: Context, side: Side) -> None:
-        """Speak for the arm on `side`."""
         self._context = context
         self._side: Side = side
         self._commanded: Array | None = None

@@ -134,7 +134,6 @@ class Disassemble:
         return result
 
     async def _some(self, context: Context, goal: DisassembleGoal) -> SkillResult:
-        """Go along the pack."""
         start, report, docks = context.t, DisassembleReport(), goal.docks
         if docks:
             docked = await self._dock(context, goal, report)

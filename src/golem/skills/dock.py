@@ -156,7 +156,6 @@ class Dock:
     Goal, Result = DockGoal, DockReport
 
     def __init__(self) -> None:
-        """Know of no container."""
         self._tray: Array | None = None
         """(3,) where it was seen last, in the odometry's frame [m]."""
 
@@ -224,14 +223,12 @@ class Dock:
 
 
 def _good(view: _View, goal: DockGoal) -> bool:
-    """Return whether the robot may stay where it is."""
     if view.here is not None and view.best is not None and view.best.quality > NOTHING:
         return view.here.quality >= GOOD * view.best.quality
     return view.distance <= goal.tolerance and abs(view.left.yaw) <= goal.turned
 
 
 def _result(view: _View, goal: DockGoal, approaches: int, seconds: float) -> SkillResult:
-    """Say how the robot stands."""
     left, edge = view.left, view.edge
     report = DockReport((left.x, left.y, left.yaw), approaches=approaches)
     text = f"Standing {100 * view.distance:.1f} cm and {math.degrees(left.yaw):.1f} deg from the stance"

@@ -62,7 +62,6 @@ class Explore:
     Goal = ExploreGoal
 
     def __init__(self, config: KeptFileConfig | None = None) -> None:
-        """Keep maps in the folder of `config`."""
         self.config = config or KeptFileConfig()
 
     def timeout(self, goal: ExploreGoal) -> float:
@@ -120,7 +119,6 @@ class Explore:
         return kept_file(self.config.folder, f"{name}.yaml", load_map).with_suffix("")
 
     def _here(self, context: Context) -> PlanarPose:
-        """Return where the robot is on the map."""
         return context.T_odom_map.to(PlanarPose.of(context.legs.pose))
 
     def _next(self, context: Context, given_up: list[PlanarPose]) -> PlanarPose | None:
@@ -135,7 +133,6 @@ class Explore:
         return None
 
     async def _save(self, context: Context, path: Path) -> str:
-        """Keep the map, and return a sentence about it."""
         news = News(context.bus, topics.MAP_SAVED)
         context.publish(topics.MAP_SAVE, MapFile(str(path)))
         found: list[MapFile] = []

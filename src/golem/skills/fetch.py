@@ -208,7 +208,6 @@ class Fetch:
         return context.T_odom_map.to(place) if context.mapped else place
 
     async def _take_one(self, context: Context, goal: FetchGoal, report: FetchReport, walks: bool) -> TakeReport:
-        """Go from place to place until it is in a hand."""
         context.say("recall", f"Where is the {goal.text}?")
         places, result = await self._remembered(context, goal), None
         if not places:
@@ -322,7 +321,6 @@ class Fetch:
             return 1
 
     async def _navigate(self, context: Context, target: PlanarPose) -> None:
-        """Walk to a pose in odom."""
         goal = NavigateGoal(target.x, target.y, target.yaw, "odom", content=0.1)
         walked = await context.run("navigate", goal)
         if not walked.success:

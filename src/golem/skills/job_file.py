@@ -171,7 +171,6 @@ def _take(
     one: PackFastener, fate: Fate, reason: str, side: str, tray: str, stance: PlanarPose | None, t: float, when: str,
     picture: str,
 ) -> None:  # fmt: skip
-    """Put an event to the fastener that it is of."""
     one.fate, one.reason, one.side, one.tray, one.t, one.when = fate, reason, side, tray, t, when
     one.picture, one.stance = picture or one.picture, stance or one.stance
     one.tries += fate is Fate.TRYING

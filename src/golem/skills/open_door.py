@@ -253,7 +253,6 @@ class OpenDoor:
         raise failed("approach", refused) from refused
 
     async def _grasp(self, context: Context, motion: PlannedMotion, grasp: Grasp, side: Side) -> None:
-        """Go straight to the handle and close."""
         from golem.skills.travel import APPROACH, failed
 
         arm, hand = context.arms[side], context.hands[side]
@@ -309,7 +308,6 @@ class OpenDoor:
             await arm.move(retracted(arm.commanded, self._config.back), self._config.travel_speed)
 
     async def _home(self, context: Context, motion: PlannedMotion, side: Side, home: Array) -> None:
-        """Bring the arm home, as far as it can go."""
         motion.look()
         try:
             await motion.to_joints(home, [side], self._config.travel_speed)

@@ -160,7 +160,6 @@ class PalmLook:
     """
 
     def __init__(self, context: Context, motion: PlannedMotion, side: Side, config: TakeThingConfig) -> None:
-        """Take distances and speeds from `config`."""
         self._context, self._motion, self._config = context, motion, config
         self._side: Side = side
         self.off: Array = np.zeros(2)

@@ -248,7 +248,6 @@ class Pick:
         raise refused[0]
 
     async def _over(self, context: Context, attempt: Attempt, grasp: Grasp) -> None:
-        """Bring the open hand above a grasp."""
         T = grasp.T_odom_gripper
         target, count = T[:3, 3].tolist(), len(self._report.tried)
         context.say("approach", "Bringing the hand over it.", target=target, side=attempt.side, attempt=count)
@@ -362,7 +361,6 @@ class Pick:
         context.hands[attempt.side].close(self._config.force)
 
     def _check_grip(self, context: Context, attempt: Attempt) -> None:
-        """Check that something is between the fingers."""
         status = context.hands[attempt.side].status
         if not status.holding:
             text = f"The fingers hold nothing (gap {status.gap * 1e3:.0f} mm)."
@@ -391,7 +389,6 @@ def _hands(goal: PickGoal, tried: Sequence[Attempt]) -> list[Side]:
 
 
 def _seen(report: PickReport) -> str:
-    """Return what the look afterwards adds to a sentence."""
     words = {
         Sight.YES.value: ", and is seen there",
         Sight.NO.value: ", but is not seen there",

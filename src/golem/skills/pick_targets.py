@@ -239,7 +239,6 @@ class TargetChoice:
     """Looks and chooses."""
 
     def __init__(self, config: PickConfig) -> None:
-        """Take workspace and comfort from `config`."""
         self._config = config
 
     async def look(self, context: Context, goal: PickGoal) -> PickChoice:
@@ -318,7 +317,6 @@ class TargetChoice:
         return view
 
     def _added(self, context: Context, goal: PickGoal, view: _View, sightings: Detections) -> _View:
-        """Return what is known after one more picture."""
         container, objects = view.container, list(view.objects)
         containers = [
             Container.of(o, self._config.container_radius) for o in sightings.objects if o.label == goal.container

@@ -192,7 +192,6 @@ class SetDown:
         return SkillResult(True, "done", None, text, {"total": context.t - start}, self._report)
 
     def _holder(self, context: Context, goal: PlaceGoal) -> Side:
-        """Return the hand that holds something."""
         for side in SIDES if goal.side == "either" else (goal.side,):
             if context.hands[side].status.holding:
                 return side
@@ -330,7 +329,6 @@ class SetDown:
         self._report.x, self._report.y, self._report.z = (float(v) for v in arm.pose[:3, 3])
 
     async def _release(self, context: Context, motion: PlannedMotion, side: Side) -> None:
-        """Let go, back off, and go home."""
         c, arm, hand = self._config, context.arms[side], context.hands[side]
         context.say("release", "Letting go.", side=side)
         hand.open(min(hand.status.gap + 0.03, MAX_GAP))

@@ -93,7 +93,6 @@ class PlannedMotion:
     """
 
     def __init__(self, context: Context) -> None:
-        """Plan for `context`."""
         self._context = context
         self._planner = context.modules.planner()
         self._robot, self._goals, self._lines = PlanningRobot(), GoalPostures(), LineChecker()

@@ -289,7 +289,6 @@ class Take:
             self._report.aside_y = 0.0
 
     async def _grasp(self, context: Context, motion: PlannedMotion, side: Side, grasp: Grasp) -> None:
-        """Go straight to the thing and close."""
         from golem.skills.travel import APPROACH, failed
 
         c, arm, hand = self._config, context.arms[side], context.hands[side]

@@ -41,7 +41,6 @@ class GoalPostures:
     """
 
     def __init__(self) -> None:
-        """Build the arm's model."""
         self._ik, self._around = DiffIK(_OFFLINE), DiffIK(_AROUND)
         self.nearest = np.inf
 

@@ -26,7 +26,6 @@ class HandForce:
     """
 
     def __init__(self) -> None:
-        """Build the arm's model."""
         self._arm = UpperKinematics()
 
     def __call__(self, side: Side, q: Array, tau: Array) -> Array:
@@ -76,7 +75,6 @@ class ContactSense:
     """
 
     def __init__(self, side: Side) -> None:
-        """Sense the hand on `side`."""
         self._side: Side = side
         self._feel = HandForce()
         self._quick: Array | None = None

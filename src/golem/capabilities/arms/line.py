@@ -130,7 +130,6 @@ class LineChecker:
     """
 
     def __init__(self) -> None:
-        """Build the arm's model."""
         self.ik = DiffIK()
 
     def check(
@@ -198,7 +197,6 @@ class LineChecker:
         return LineCheck(worst, turned, away, path)
 
     def _stopped(self) -> str:
-        """Return which joints are at their limits now."""
         gaps = np.minimum(self.ik.q - self.ik.lower, self.ik.upper - self.ik.q)
         names = [JOINT_NAMES[UPPER][j] for j in np.flatnonzero(gaps < AT_LIMIT)]
         return f"; at a limit: {', '.join(names)}" if names else ""

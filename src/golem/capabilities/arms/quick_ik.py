@@ -24,7 +24,6 @@ class QuickIK:
     """
 
     def __init__(self) -> None:
-        """Build the model."""
         self.kinematics = UpperKinematics()
         self._arms = {side: self._arm(side) for side in SIDES}
 

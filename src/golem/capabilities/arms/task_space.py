@@ -83,11 +83,6 @@ class TaskSpaceConfig:
     palm_turn: float = 2.0
 
     def __post_init__(self) -> None:
-        """Refuse values that have no meaning.
-
-        Raises:
-            ConfigError: a value is out of range; the message names it.
-        """
         for name in _POSITIVE:
             if not getattr(self, name) > 0.0:
                 raise ConfigError(f"The arm controller's option {name} must be positive, not {getattr(self, name)}.")
@@ -242,7 +237,6 @@ class TaskSpaceController(ABC):
         return ArmCommand(task.q.copy(), task.error[0].copy(), task.error[1].copy(), limited)
 
     def _damp(self, sides: list[int]) -> None:
-        """Add the damping of arms that are near a singularity."""
         c, added = self.config, 0.0
         for i in sides:
             J = self.task.J[i, :, 1:]

@@ -31,7 +31,6 @@ class TrajectoryFollower:
     """
 
     def __init__(self) -> None:
-        """Take the limits that the safety gate enforces."""
         self._lower, self._upper, self._speed = gate_limits()
         self.q: Array = np.zeros(NUM_UPPER)
         self._t = 0.0

@@ -115,7 +115,6 @@ class ViewProblem(ABC):
     scale: Array
 
     def __init__(self, views: Sequence[TagView]) -> None:
-        """Explain `views`."""
         self.views = list(views)
 
     @abstractmethod

@@ -16,7 +16,6 @@ class TagDetector:
     """Finds tags."""
 
     def __init__(self) -> None:
-        """Prepare OpenCV's detector: corners by the edges' sub-pixel places."""
         options = cv2.aruco.DetectorParameters()
         options.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
         options.cornerRefinementWinSize = 3

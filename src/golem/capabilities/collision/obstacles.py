@@ -180,7 +180,6 @@ class World:
     """
 
     def __init__(self, obstacles: Sequence[Obstacle] = (), cloud: CloudGrid | None = None) -> None:
-        """Lay the shapes out for the kernel."""
         self.obstacles, self.cloud = tuple(obstacles), cloud
         self.shapes: Array = np.zeros((len(self.obstacles), 16))
         for row, obstacle in zip(self.shapes, self.obstacles, strict=True):

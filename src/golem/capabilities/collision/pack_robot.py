@@ -270,7 +270,6 @@ def _bar(what: str, things: Collection[T]) -> Iterable[T]:
 
 
 def _tell(links: Sequence[LinkGeometry]) -> None:
-    """Print what of a file is not as its author may think."""
     rows = {
         "No surface": [link.name for link in links if not link.parts],
         "Held, its limits are equal": [x.joint for x in links if x.kind != "fixed" and x.lower == x.upper],

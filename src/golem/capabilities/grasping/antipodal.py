@@ -116,7 +116,6 @@ class Antipodal(OpenLoop):
     """
 
     def __init__(self, config: AntipodalConfig | None = None) -> None:
-        """Take the options."""
         self.config = config or AntipodalConfig()
         self.latency = self.config.latency
 

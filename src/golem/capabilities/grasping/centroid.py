@@ -82,7 +82,6 @@ class Centroid(OpenLoop):
     latency = 0.0
 
     def __init__(self, config: CentroidConfig | None = None) -> None:
-        """Take the distances from `config`."""
         self.config = config or CentroidConfig()
 
     def propose(self, target: LocalizedObject, scene: Array, gripper: Gripper) -> list[Grasp]:

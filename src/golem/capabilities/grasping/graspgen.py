@@ -175,7 +175,6 @@ def _in_our_frame(poses: Array, tip: float) -> Array:
 
 
 def _pack_array(value: object) -> object:
-    """Return an array as msgpack-numpy packs it."""
     if not isinstance(value, np.ndarray):
         raise TypeError(f"a {type(value).__name__} is not sent")
     data = np.ascontiguousarray(value)

@@ -112,7 +112,6 @@ class LookAndMove(VisualServo):
     config: LookAndMoveConfig
 
     def __init__(self, config: LookAndMoveConfig | None = None) -> None:
-        """Take the numbers from `config`."""
         super().__init__(config or LookAndMoveConfig())
 
     def servo(self, target: LocalizedObject, grasp: Grasp, t: float) -> ServoLaw:

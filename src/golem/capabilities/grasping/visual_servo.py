@@ -218,7 +218,6 @@ class CentroidServo:
             self._normal = mixed / np.linalg.norm(mixed)
 
     def _look_again(self, t: float) -> None:
-        """Go up to look, higher each time."""
         self._seen_at, self._sightings = t, 0
         self._lift = self._config.retreat * self._retreats
         self._variance = np.full(3, self._config.first_radius**2)
@@ -271,7 +270,6 @@ class VisualServo:
     latency = Centroid.latency
 
     def __init__(self, config: VisualServoConfig | None = None) -> None:
-        """Take the numbers from `config`."""
         self.config = config or VisualServoConfig()
         self._coarse = Centroid(self.config.centroid)
 

@@ -124,7 +124,6 @@ class VelocityIntegrator:
     """
 
     def __init__(self, config: VelocityIntegratorConfig | None = None) -> None:
-        """Begin without a correction."""
         self.config = c = config or VelocityIntegratorConfig()
         self.memory = new_record(TRIM)
         for name in ("gain", "smoothing", "maximum", "heed"):

@@ -35,11 +35,6 @@ class Envelope:
     height: tuple[float, float, float] | None = None
 
     def __post_init__(self) -> None:
-        """Check the ranges.
-
-        Raises:
-            ConfigError: zero is outside of one, or a bound is not finite, or the heights make no sense.
-        """
         for axis in ("vx", "vy", "wz"):
             low, high = getattr(self, axis)
             if not (-inf < low <= 0.0 <= high < inf):

@@ -56,11 +56,6 @@ class GaitConfig:
     patience: float = 1.0
 
     def __post_init__(self) -> None:
-        """Check the numbers.
-
-        Raises:
-            ConfigError: one of them cannot be meant.
-        """
         lengths = (*self.capture_start, self.capture_stop, self.feet_start, self.feet_stop)
         require(
             "gait.",
@@ -142,7 +137,6 @@ class Gait:
     """
 
     def __init__(self, config: GaitConfig, shape: tuple[int, ...] = ()) -> None:
-        """Begin with every robot standing."""
         self.memory: Records = np.zeros(shape, GAIT)
         self.options = new_record(GAIT_OPTIONS)
         self.phase: Array = self.memory["phase"]

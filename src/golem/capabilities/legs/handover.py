@@ -258,10 +258,8 @@ class Handover:
 
 
 def _standing(motion: LocomotionCommand) -> LocomotionCommand:
-    """Return `motion` without its twist."""
     return LocomotionCommand(ZERO, motion.phase, motion.stepping, False, motion.height)
 
 
 def _is_ready(controller: LowerBody) -> bool:
-    """Return whether `controller` can carry the robot now."""
     return not isinstance(controller, Starting) or controller.started

@@ -55,7 +55,6 @@ class FootSeparation:
     """The correction of one robot's leg targets."""
 
     def __init__(self, config: FootSeparationConfig | None = None) -> None:
-        """Follow `config`."""
         self.config = config or FootSeparationConfig()
         self._legs = LegDynamics()
 
@@ -117,11 +116,6 @@ class LocomotionConfig:
     foot_separation: FootSeparationConfig | None = field(default_factory=FootSeparationConfig)
 
     def __post_init__(self) -> None:
-        """Check the numbers.
-
-        Raises:
-            ConfigError: one of them cannot be meant.
-        """
         require(
             "locomotion option ",
             ("acceleration", min(self.acceleration), min(self.acceleration) > 0.0, "three positive numbers"),
@@ -148,7 +142,6 @@ class Locomotion:
     """
 
     def __init__(self, controller: LowerBody, config: LocomotionConfig | None = None) -> None:
-        """Run `controller`."""
         self.config = config or LocomotionConfig()
         self.gait = Gait(controller.gait)
         self._paced = RateDivider(controller)

@@ -29,7 +29,6 @@ class FloorPlane:
     """
 
     def __init__(self) -> None:
-        """Wait for a scan."""
         self.plane: Array | None = None
         self._found = False
 

@@ -28,7 +28,6 @@ class RobotFilter:
     """
 
     def __init__(self) -> None:
-        """Load the spheres."""
         self.model = CollisionModel(load_spheres())
         self._order = [JOINT_NAMES.index(name) for name in self.model.joints]
         links = [link.name for link in self.model.robot.links]

@@ -37,7 +37,6 @@ class VoxelMap:
     """
 
     def __init__(self, resolution: float, band: tuple[float, float]) -> None:
-        """Begin with nothing."""
         self.resolution, self.band = resolution, band
         self.voxels: voxel_kernel.Voxels = np.zeros((0, 0, 0), np.int8)
         self.cells: NDArray[np.int8] = np.zeros((0, 0), np.int8)
@@ -196,11 +195,6 @@ class GridConfig:
     gain: float = 0.3
 
     def __post_init__(self) -> None:
-        """Check the numbers.
-
-        Raises:
-            ConfigError: one of them cannot be meant.
-        """
         low, high = self.band
         require(
             "mapper option ",

@@ -96,7 +96,6 @@ class BagOfLabels:
     SIZE = 256
 
     def __init__(self) -> None:
-        """Begin without labels."""
         self._component: dict[str, int] = {}
 
     def frame(self, observation: Observation) -> Array:
@@ -172,7 +171,6 @@ class FrameIndex:
     """Frames by what they look like."""
 
     def __init__(self, config: FrameIndexConfig | None = None) -> None:
-        """Remember nothing yet."""
         self._config = config or FrameIndexConfig()
         self._encoder = self._config.create()
         self._vectors: list[Array] = []

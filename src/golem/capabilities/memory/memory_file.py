@@ -38,7 +38,6 @@ class ObjectRecords:
     """Objects by number, in rows that move when one is removed."""
 
     def __init__(self) -> None:
-        """Begin with none."""
         self._values: Array = np.empty((16, len(COLUMNS)), order="F")
         self._numbers: NDArray[np.int64] = np.empty(16, np.int64)
         self._labels: list[str] = []

@@ -55,7 +55,6 @@ class TopDownMap:
     """What is above each cell of the floor."""
 
     def __init__(self, config: TopDownMapConfig | None = None) -> None:
-        """Remember nothing yet."""
         self._config = config or TopDownMapConfig()
         self._cells: dict[tuple[int, int], _Cell] = {}
         self.last = -math.inf

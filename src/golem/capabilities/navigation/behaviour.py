@@ -35,7 +35,6 @@ class Action:
     """A leaf that runs a function of the time since it began [s]."""
 
     def __init__(self, function: Callable[[float], BehaviourStatus]) -> None:
-        """Run `function`."""
         self._function, self._t = function, 0.0
 
     def tick(self, dt: float) -> BehaviourStatus:
@@ -55,7 +54,6 @@ class Composite:
     goes_on: BehaviourStatus
 
     def __init__(self, *children: Behaviour) -> None:
-        """Take the children in their order."""
         self._children, self._at = children, 0
 
     def tick(self, dt: float) -> BehaviourStatus:

@@ -35,11 +35,6 @@ class CostmapConfig:
     occupied: int = 65
 
     def __post_init__(self) -> None:
-        """Check the numbers.
-
-        Raises:
-            ConfigError: one of them cannot be meant.
-        """
         require(
             "costmap option ",
             ("decay", self.decay, 0.0 < self.decay < math.inf, "a positive number per metre"),

@@ -138,11 +138,6 @@ class CostmapAstarConfig:
     stop: GoToConfig = field(default_factory=lambda: GoToConfig(speed=(0.3, 0.2, 0.4)))
 
     def __post_init__(self) -> None:
-        """Check the numbers.
-
-        Raises:
-            ConfigError: one of them cannot be meant.
-        """
         times = ("replan", "stale", "lost", "patience", "stuck", "wait", "near", "back")
         rows = ((name, getattr(self, name)) for name in times)
         require(
@@ -169,7 +164,6 @@ class CostmapAstar:
     latency = 0.02
 
     def __init__(self, config: CostmapAstarConfig | None = None) -> None:
-        """Begin without a goal."""
         self.config = c = config or CostmapAstarConfig()
         self._local = LocalController(c.local)
         self._approach = GoTo(c.stop)
@@ -249,7 +243,6 @@ class CostmapAstar:
 
     @property
     def _path(self) -> Array | None:
-        """The way, for people."""
         return None if self._way is None else self._way.points
 
     def _look(self, inputs: NavInputs, dt: float) -> str:
@@ -310,7 +303,6 @@ class CostmapAstar:
         return min(rooms) > 0.5 * self.config.local.margin
 
     def _finish(self, inputs: NavInputs, dt: float) -> NavStep:
-        """Approach the goal, unless something comes between."""
         s = self._surroundings
         step = self._approach.step(inputs, dt)
         if step.twist != ZERO and not self._local.clear(
@@ -348,7 +340,6 @@ class CostmapAstar:
         return BehaviourStatus.SUCCESS if since >= self.config.wait else BehaviourStatus.RUNNING
 
     def _replanned(self, since: float) -> BehaviourStatus:
-        """Succeed if there is a way, and a twist along it."""
         self._plan()
         if self._way is None:
             return BehaviourStatus.FAILURE
@@ -364,7 +355,6 @@ class CostmapAstar:
         return BehaviourStatus.SUCCESS
 
     def _back_up(self, since: float) -> BehaviourStatus:
-        """Go back while that is free."""
         if since == 0.0 or self._backed is None:
             self._backed = self._pose
         gone = self._backed.to(self._pose)

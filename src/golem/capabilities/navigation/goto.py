@@ -71,11 +71,6 @@ class GoToConfig:
     learn: float = 0.5
 
     def __post_init__(self) -> None:
-        """Check the numbers.
-
-        Raises:
-            ConfigError: one of them cannot be meant.
-        """
         positive = ("gain", "face", "pulse", "creep", "smoothing", "close", "aligned", "accept", "straight")
         values = {name: getattr(self, name) for name in positive} | {"speed": min(self.speed)}
         times = {name: getattr(self, name) for name in ("dwell", "rest", "settle", "march")}
@@ -179,7 +174,6 @@ class GoTo:
         return self._goal @ PlanarPose(*(self._sum / rested).tolist())
 
     def _at(self) -> PlanarPose:
-        """Return the smoothed pose."""
         assert self._pose is not None
         return PlanarPose(*self._pose.tolist())
 

@@ -133,11 +133,6 @@ class LocalControllerConfig:
     slow: float = 0.35
 
     def __post_init__(self) -> None:
-        """Check the numbers.
-
-        Raises:
-            ConfigError: one of them cannot be meant.
-        """
         names = ("forward", "backward", "sideways", "turn", "look", "horizon", "yields", "margin", "slow")
         rows = ((name, getattr(self, name)) for name in names)
         require("local option ", *((n, v, 0.0 < v < math.inf, "a positive number") for n, v in rows))
@@ -157,7 +152,6 @@ class LocalController:
     """Chooses among twists by what they lead to; see `local_controller.score`."""
 
     def __init__(self, config: LocalControllerConfig) -> None:
-        """Prepare the twists that are tried."""
         self.config = config
         c = config
         vx = [-c.backward, 0.0, *(share * c.forward for share in (0.25, 0.5, 0.75, 1.0))]

@@ -59,7 +59,6 @@ class _Blob:
     velocity: Array = field(default_factory=lambda: np.zeros(2))
 
     def take(self, t: float, points: Array) -> None:
-        """Take what a scan at time `t` showed of it."""
         low, high = points.min(axis=0), points.max(axis=0)
         self.places.append((t, *low.tolist(), *high.tolist()))
         self.middle, self.points = 0.5 * (low + high), points
@@ -75,7 +74,6 @@ class Movers:
     """Follows blobs; all points are in one frame."""
 
     def __init__(self) -> None:
-        """Know of nobody."""
         self.forget()
 
     def forget(self) -> None:

@@ -64,11 +64,6 @@ class Nav2Config:
     stop: GoToConfig = field(default_factory=lambda: GoToConfig(speed=(0.3, 0.2, 0.4)))
 
     def __post_init__(self) -> None:
-        """Check the numbers.
-
-        Raises:
-            ConfigError: one of them cannot be meant.
-        """
         require(
             "nav2 option ",
             ("patience", self.patience, 0.0 < self.patience < math.inf, "a positive time in seconds"),

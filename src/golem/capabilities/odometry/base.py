@@ -137,7 +137,6 @@ class OdomOrigin:
     """Puts odom where a method's own frame has base_link at first: level, at base_link, heading along x."""
 
     def __init__(self) -> None:
-        """Wait for the first pose."""
         self._T_odom_own: Array = np.eye(4)
         self._set = False
 

@@ -14,7 +14,6 @@ class Legs(Ignores):
     sources: tuple[Source, ...] = ("legs",)
 
     def __init__(self) -> None:
-        """Wait for the legs."""
         self.reset()
 
     def reset(self) -> None:

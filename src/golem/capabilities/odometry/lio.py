@@ -333,7 +333,6 @@ class Lio(Ignores):
             self.map.insert(local @ state.R.T + state.p, self._birth + float(np.trace(state.P[3:6, 3:6])) / 3.0)
 
     def _judge(self, state: ErrorState) -> None:
-        """Say whether the odometry is lost."""
         spread = math.sqrt(max(float(state.P[3, 3]), float(state.P[4, 4]), float(state.P[5, 5])))
         age = state.t - self._fitted_at
         if age > self.config.silent_at:

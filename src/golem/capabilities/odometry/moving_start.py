@@ -30,7 +30,6 @@ class MovingStart:
     """Waits for the legs to tell the velocity, and takes the mean specific force beyond their acceleration for up."""
 
     def __init__(self) -> None:
-        """Wait."""
         self._window: deque[tuple[LidarImu, Array | None]] = deque(maxlen=WINDOW)
         self._first = math.nan
 

@@ -34,7 +34,6 @@ class PlaneMap:
     """The voxels of every size, in hash tables that grow."""
 
     def __init__(self) -> None:
-        """Start empty."""
         self.keys: NDArray[np.int64] = np.full((len(SIZES), 2**13), _EMPTY)
         self.cells: Array = np.zeros((len(SIZES), 2**13, _WIDTH))
         self._used: NDArray[np.int64] = np.zeros(len(SIZES), dtype=np.int64)

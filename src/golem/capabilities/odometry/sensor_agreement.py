@@ -33,7 +33,6 @@ class SensorAgreement:
     """
 
     def __init__(self) -> None:
-        """Take everything for sound."""
         self.why = ""
         self._scans = self._samples = self._velocities = 0
         self._back = 0.0

@@ -51,7 +51,6 @@ class StillStart:
     """Waits for the robot to stand still."""
 
     def __init__(self) -> None:
-        """Wait."""
         self._window: deque[LidarImu] = deque(maxlen=WINDOW)
 
     def add(self, sample: LidarImu, waist: float) -> Beginning | None:

@@ -90,7 +90,6 @@ class PlaneClusters:
     classes = LABELS
 
     def __init__(self, config: PlaneClustersConfig | None = None) -> None:
-        """Take the options."""
         self.config = config or PlaneClustersConfig()
         self.latency = self.config.latency
 

@@ -165,7 +165,6 @@ class Effort:
     """
 
     def __init__(self, request: PlanRequest) -> None:
-        """Begin with all the effort of `request`."""
         self.used, self._most, self._stop = 0, request.effort, request.stop
 
     @property

@@ -64,7 +64,6 @@ class ActionStream:
     """
 
     def __init__(self, policy: ActionPolicy, config: PolicyLinkConfig, prompt: str = "") -> None:
-        """Ask `policy` to do `prompt`."""
         self._policy, self._config, self._prompt = policy, config, prompt
         self._pool = ThreadPoolExecutor(1, "policy")
         self._job: tuple[Future[Any], float] | None = None

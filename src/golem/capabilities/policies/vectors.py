@@ -95,7 +95,6 @@ class Vectors:
     """Makes vectors of moments."""
 
     def __init__(self) -> None:
-        """Build the model for forward kinematics."""
         self._kinematics = Kinematics()
 
     def state(self, now: Instant) -> Array:

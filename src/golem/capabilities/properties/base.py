@@ -34,7 +34,6 @@ class Properties:
     stiffness: float
 
     def __post_init__(self) -> None:
-        """Check the numbers."""
         for name, (low, high) in BOUNDS.items():
             value = getattr(self, name)
             if not math.isfinite(value) or not low <= value <= high:

@@ -17,7 +17,6 @@ class DeviceClock:
     """Turns the device's time into ours."""
 
     def __init__(self) -> None:
-        """Start before the first message."""
         self._delays: deque[tuple[float, float]] = deque()
 
     def add(self, device: float, t: float) -> None:

@@ -82,7 +82,6 @@ class StatusParser:
     """
 
     def __init__(self) -> None:
-        """Start at an unknown place of the stream."""
         self.skipped = 0
         self._rest = b""
 

@@ -194,8 +194,6 @@ class MagpieServoConfig:
 
 
 class _Finger:
-    """What is known of one finger."""
-
     def __init__(self, config: FingerConfig) -> None:
         self.config = config
         self.state: Ax12State | None = None

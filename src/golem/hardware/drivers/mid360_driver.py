@@ -135,7 +135,6 @@ class ScanAssembler:
     """
 
     def __init__(self) -> None:
-        """Start before the first datagram."""
         self.lost = 0
         self._begin = self._next = 0
         self._parts: list[PointDatagram] = []

@@ -44,7 +44,6 @@ class Attitude:
     """
 
     def __init__(self) -> None:
-        """Start without a heading."""
         self.heading = 0.0
 
     def reset(self, state: LowState) -> None:

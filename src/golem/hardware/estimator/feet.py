@@ -57,7 +57,6 @@ class Contact:
     """
 
     def __init__(self, config: ContactConfig, shape: tuple[int, ...] = ()) -> None:
-        """Begin with feet of which nothing is known."""
         self.config = config
         self.planted: NDArray[np.bool_] = np.zeros((*shape, 2), dtype=bool)
         self.age: Array = np.zeros((*shape, 2))

@@ -314,7 +314,6 @@ class InvariantEKF(CompiledEstimator):
     """
 
     def __init__(self, config: InvariantEKFConfig | None = None) -> None:
-        """Start at rest."""
         self.config = config or InvariantEKFConfig()
         super().__init__(CompiledStage(_code(), new_record(INVARIANT_EKF)))
         memory = self.stage.memory

@@ -128,7 +128,6 @@ class RandomWalk:
     """
 
     def __init__(self, config: RandomWalkConfig, shape: tuple[int, ...] = ()) -> None:
-        """Begin at rest."""
         self.config = config
         self._memory = np.zeros(shape, FILTER)
         self._memory["options"] = filter_options(config)
@@ -251,7 +250,6 @@ class RandomWalkKF(CompiledEstimator):
     """
 
     def __init__(self, config: RandomWalkKFConfig | None = None) -> None:
-        """Start at rest."""
         self.config = config or RandomWalkKFConfig()
         super().__init__(CompiledStage(_code(), new_record(RANDOM_WALK)))
         memory = self.stage.memory

@@ -50,7 +50,6 @@ class TetherEstimator(CompiledEstimator):
     requires = ("hoist",)
 
     def __init__(self) -> None:
-        """Start without a heading."""
         super().__init__(CompiledStage(_code(), new_record(TETHER)))
 
     def reset(self, state: LowState) -> None:

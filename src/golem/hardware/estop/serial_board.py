@@ -55,7 +55,6 @@ class FrameParser:
     """
 
     def __init__(self) -> None:
-        """Start at an unknown place of the stream."""
         self.skipped = 0
         self._rest = b""
 

@@ -42,7 +42,6 @@ class DeliGrasp(MagpieHand):
     """One MAGPIE hand that grasps as softly as the part allows; opens fully when it starts."""
 
     def __init__(self, config: DeliGraspConfig | None = None) -> None:
-        """Start opening."""
         self._options = config or DeliGraspConfig()
         self._due = math.inf
         self._finished = False

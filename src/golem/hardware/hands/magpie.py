@@ -67,7 +67,6 @@ class MagpieHand:
     """
 
     def __init__(self, config: MagpieConfig | None = None) -> None:
-        """Start opening."""
         self.config = config or MagpieConfig()
         self._last: HandState | None = None
         self.open()

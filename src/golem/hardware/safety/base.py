@@ -211,7 +211,6 @@ class SafetyLimits:
     table: Array = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        """Fill the table."""
         object.__setattr__(self, "table", limit_table(self))
 
     def still(self) -> SafetyLimits:

@@ -282,7 +282,6 @@ class GateStage:
     """
 
     def __init__(self, limits: SafetyLimits) -> None:
-        """Enforce `limits`."""
         self.stage = CompiledStage(_code(), new_record(GATE))
         memory = self.stage.memory
         for name in (*_LIMITS, "gravity", "gravity_moving", "throw", "table"):

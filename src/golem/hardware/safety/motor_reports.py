@@ -45,7 +45,6 @@ class MotorWatch:
     """
 
     def __init__(self, limits: SafetyLimits) -> None:
-        """Compare with `limits`."""
         self._limits = limits
         self._was_on = np.zeros(NUM_JOINTS, dtype=bool)
         self._powered = np.zeros(NUM_JOINTS, dtype=bool)

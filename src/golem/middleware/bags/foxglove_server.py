@@ -144,8 +144,6 @@ class FoxgloveServer:
 
 
 class _Listener(foxglove.websocket.ServerListener):
-    """Hears of subscriptions in the server's own thread."""
-
     def __init__(self, server: FoxgloveServer) -> None:
         self._server = server
 

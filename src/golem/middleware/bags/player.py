@@ -94,7 +94,6 @@ class Player:
                 writer.close()
 
     def _play(self, stop: threading.Event) -> int:
-        """Play once."""
         begin, written = time.monotonic() - self._config.start / self._config.rate, 0
         for elapsed, writer, payload in self._events():
             due = begin + elapsed / NANO / self._config.rate

@@ -53,7 +53,6 @@ class _Endpoint:
     kind: str
 
     def __init__(self, owner: Owner, topic: str, type_name: str, qos: Qos, entity: int) -> None:
-        """Take over `entity`, which exists."""
         self.topic, self.type_name, self.qos, self.entity = topic, type_name, qos, entity
         self._owner = owner
         self._open = True
@@ -65,7 +64,6 @@ class _Endpoint:
         self.handle = handle.value
 
     def close(self) -> None:
-        """Leave the domain."""
         with self._lock:
             was_open, self._open = self._open, False
         if was_open:

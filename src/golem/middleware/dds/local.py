@@ -130,7 +130,6 @@ class LocalParticipant:
     network: NetworkPlace | None = None
 
     def __init__(self, domain: LocalDomain) -> None:
-        """Join `domain`."""
         self._domain = domain
         self._number = domain.number()
         self.guid = _guid(self._number, 0x1C1)

@@ -60,7 +60,6 @@ class ActionClient:
     """
 
     def __init__(self, endpoints: NodeEndpoints, name: str, type: str) -> None:
-        """Use the action with absolute `name`."""
         self.name, self.malformed = name, 0
         self._type, self._endpoints = codec.action(type), endpoints
         self._goals: weakref.WeakValueDictionary[bytes, ClientGoal] = weakref.WeakValueDictionary()

@@ -54,7 +54,6 @@ class Client:
     """
 
     def __init__(self, endpoints: NodeEndpoints, name: str, type: str) -> None:
-        """Call the service with absolute `name`."""
         self.name, self.malformed = name, 0
         self._endpoints = endpoints
         self._type = codec.service(type)

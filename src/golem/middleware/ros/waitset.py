@@ -26,7 +26,6 @@ class WaitSet:
     """The inboxes of one node, and which of them have something to handle."""
 
     def __init__(self) -> None:
-        """Start with no inboxes."""
         self._ready: deque[Inbox] = deque()
         # Held until something is ready. Less to wake a thread by than an Event; and unlike a SimpleQueue (CPython 3.11)
         # it does not wait for ever where a signal outlasts the timeout.

@@ -62,7 +62,6 @@ class Intake:
     """What has come from one writer for one reader."""
 
     def __init__(self, reader_id: bytes, writer_id: bytes) -> None:
-        """Have received nothing."""
         self._reader_id, self._writer_id = reader_id, writer_id
         self._next, self._count = 1, 0
         self._ahead: set[int] = set()
@@ -122,7 +121,6 @@ class FastDdsPeer:
     """
 
     def __init__(self, prefix: bytes, announced: announcements.Announced, address: str, now: float) -> None:
-        """Know nothing but this of it."""
         self.prefix, self.announced, self.address, self.seen = prefix, announced, address, now
         self.topics: dict[bytes, str] = {}
         self.writers = Outbox(announcements.WRITERS_WRITER, announcements.WRITERS_READER, patience=float("inf"))

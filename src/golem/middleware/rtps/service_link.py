@@ -271,7 +271,6 @@ class ServiceEndpoint:
     """
 
     def __init__(self, link: ServiceLink, guid: bytes) -> None:
-        """Belong to `link`."""
         self._link, self.guid = link, guid
 
     def close(self) -> None:
@@ -285,7 +284,6 @@ class ServiceReader(ServiceEndpoint):
     handle = 0
 
     def __init__(self, link: ServiceLink, topic: str, guid: bytes, qos: Qos, on_data: Callable[[], None]) -> None:
-        """Belong to `link`."""
         super().__init__(link, guid)
         self.on_data, self._topic, self._depth = on_data, topic, qos.depth
         self._samples: list[Sample] = []

@@ -30,7 +30,6 @@ class RpcServer:
     """
 
     def __init__(self, requests: Reader, responses: Writer) -> None:
-        """Take calls from `requests` and answer on `responses`."""
         self.refused, self.refusal = 0, ""
         self._reader, self._writer = requests, responses
 
@@ -64,7 +63,6 @@ class RpcClient:
     """Calls one service."""
 
     def __init__(self, requests: Writer, responses: Reader) -> None:
-        """Call on `requests` and take answers from `responses`."""
         self._writer, self._reader = requests, responses
 
     @property

@@ -181,7 +181,6 @@ def _let_cpus_pin() -> None:
 
 
 def _physics(backend: str) -> Any:
-    """Return the configuration of a back end."""
     if backend == "physx":
         return importlib.import_module("isaaclab_ov.physics").OvPhysxCfg()
     newton = importlib.import_module("isaaclab_newton.physics")
@@ -201,7 +200,6 @@ def _order(wanted: list[str], present: list[str], what: str) -> list[int]:
 
 
 def _versions() -> dict[str, str]:
-    """Return the versions of `TOLD` that are installed."""
     found: dict[str, str] = {}
     for name in TOLD:
         try:

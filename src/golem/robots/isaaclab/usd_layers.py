@@ -220,7 +220,6 @@ def _shape(model: mujoco.MjModel, g: int, material: str) -> Prim:
 
 
 def _joint(model: mujoco.MjModel, body: int) -> Prim:
-    """Return what connects a link with its parent."""
     parent = model.body(int(model.body_parentid[body])).name
     pos, quat, none = model.body_pos[body], model.body_quat[body], np.zeros(3)
     ends = {

@@ -45,7 +45,6 @@ class LegDynamics:
     """
 
     def __init__(self) -> None:
-        """Build the model of pelvis and legs."""
         self._tree, out = leg_tree()[0], new_record(LEG_MOTION)
         self._motion = out[0]
         self.soles: Array = out["soles"][0]

@@ -155,7 +155,6 @@ _MAKE: dict[str, Callable[..., Loft | Solid]] = {"loft": Loft, "disc": _disc, "r
 
 
 def _parts(name: str) -> list[VisualPart]:
-    """Return the parts of `looks.yaml` under a key."""
     return [
         VisualPart(row["link"], row["material"], make(**row[kind]))
         for row in DATA[name]

@@ -40,8 +40,6 @@ _SHAPES = ("box", "sphere", "cylinder", "capsule", "mesh")
 
 @dataclass(slots=True)
 class _Reader:
-    """One file, and what is wrong with it."""
-
     file: Path
     packages: Mapping[str, Path]
     folder: str

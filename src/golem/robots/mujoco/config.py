@@ -103,11 +103,6 @@ class MujocoConfig:
     tags: bool = False
 
     def __post_init__(self) -> None:
-        """Check the numbers.
-
-        Raises:
-            ConfigError: one of them is outside its range.
-        """
         for name, value, minimum, maximum in (
             ("slope", self.slope, 0.0, 0.5),
             ("step", self.step, 0.0, 0.1),

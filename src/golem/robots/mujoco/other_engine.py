@@ -53,11 +53,6 @@ class OtherEngineConfig(MujocoConfig):
     world: World = "open"
 
     def __post_init__(self) -> None:
-        """Check the numbers, and refuse what the engine cannot do.
-
-        Raises:
-            ConfigError: see above.
-        """
         super().__post_init__()
         for what, given in (
             ("self_collision", bool(self.self_collision)),

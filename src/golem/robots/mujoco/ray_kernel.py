@@ -146,7 +146,6 @@ def _plane(o: Array, d: Array, size: Array) -> float:  # pragma: no cover - comp
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _box(o: Array, d: Array, size: Array) -> float:  # pragma: no cover - compiled
-    """Return the distance to a box by its slabs."""
     enter, leave = -np.inf, np.inf
     for k in range(3):
         if abs(d[k]) < _TINY:

@@ -98,7 +98,6 @@ class Pusher:
     """
 
     def __init__(self, robot: Pushable) -> None:
-        """Push `robot`."""
         self._robot = robot
         self._push: tuple[Push, float, float] | None = None
         self.force: Array = np.zeros(3)

@@ -104,8 +104,6 @@ def build_bodies(model: mujoco.MjModel, friction: float) -> PhysxBodies:
 
 
 class _Maker:
-    """Makes bodies of a model."""
-
     def __init__(self, sapien: Any, model: mujoco.MjModel, friction: float) -> None:
         self._sapien, self._physx, self._model = sapien, sapien.physx, model
         self._world = self._physx.PhysxMaterial(friction, friction, 0.0)
@@ -286,7 +284,6 @@ class PhysxRobot(other_engine.OtherEngineRobot):
         self.truth = PhysxTruth(model, self.data, self._bodies)
 
     def _place(self) -> None:
-        """Put PhysX's robot where the model has it."""
         data, articulation = self.data, self._bodies.articulation
         base = self._base.qposadr[0]
         articulation.set_root_pose(self._pose(data.qpos[base : base + 3], data.qpos[base + 3 : base + 7]))

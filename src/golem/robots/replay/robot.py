@@ -45,7 +45,6 @@ class Track(Generic[T]):
     """One measured quantity over time."""
 
     def __init__(self) -> None:
-        """Start empty."""
         self._samples: deque[tuple[float, T]] = deque()
 
     def add(self, t: float, value: T) -> None:

@@ -129,7 +129,6 @@ def add_fridge(spec: mujoco.MjSpec, layout: FridgeLayout) -> None:
 def _add_door(
     body: mujoco.MjsBody, layout: FridgeLayout, side: float, middle: float, heights: tuple[float, float], thick: float
 ) -> None:
-    """Add the door on its hinge, with the bar."""
     low, high = heights
     door = body.add_body(name="fridge_door", pos=[thick, side * layout.arm, 0.0])
     joint = door.add_joint(

@@ -296,7 +296,6 @@ def _solid(
     kind: mujoco.mjtGeom = _BOX,
     quat: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0),
 ) -> mujoco.MjsGeom:
-    """Add a shape that is seen and collides."""
     geom = parts.collider(body, kind, size, pos, quat=quat)
     geom.rgba = [0.66, 0.67, 0.70, 1.0]
     geom.group = parts.VISUAL_GROUP

@@ -96,7 +96,6 @@ def _block(
     quat: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0),
     shade: float = 0.62,
 ) -> None:
-    """Add a box that is seen and stood on."""
     geom = parts.collider(body, _BOX, size, pos, quat=quat, friction=hall.FLOOR_FRICTION)
     geom.rgba = [shade, shade, 0.95 * shade, 1.0]
     geom.group = parts.VISUAL_GROUP

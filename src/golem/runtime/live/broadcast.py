@@ -35,7 +35,6 @@ class StatusOut:
     period = TICK
 
     def __init__(self, bus: Bus, endpoints: RoleEndpoints) -> None:
-        """Send what is on `bus`."""
         self._news, self._reports = News(bus, topics.SAFETY), StatusReports(endpoints)
 
     def step(self, t: float) -> None:

@@ -32,7 +32,6 @@ class Rate:
     """
 
     def __init__(self) -> None:
-        """Start before the first state."""
         self.value: float | None = None
         self._since: tuple[float, float] | None = None
 

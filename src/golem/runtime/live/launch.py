@@ -141,7 +141,6 @@ class Process:
     """
 
     def __init__(self, name: str, words: Sequence[str]) -> None:
-        """Start `golem WORDS`."""
         self.name = name
         # A group of its own: Ctrl-C in the terminal is for the launcher, which ends them in order. Its standard input
         # ends with the launcher, however that ends.

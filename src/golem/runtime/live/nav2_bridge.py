@@ -86,7 +86,6 @@ class Nav2Bridge:
             self._tell("active" if self._active is not None else "rejected")
 
     def _drop(self) -> None:
-        """Cancel what is pursued or on its way."""
         if self._active is not None:
             self._active.cancel()
         self._active, self._waiting = None, None
@@ -99,7 +98,6 @@ class Nav2Bridge:
             self._bus.publish(topics.NAV2_REPLY, reply, self._now())
 
     def _take(self, message: geometry_msgs.Twist) -> None:
-        """Take a twist, while a goal is pursued."""
         if self._active is not None:
             now = self._now()
             self._bus.publish(topics.NAV2_TWIST, Nav2Twist(now, convert.to_twist(message)), now)

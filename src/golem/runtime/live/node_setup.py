@@ -89,7 +89,6 @@ class AsyncLogger:
     """Says lines on a thread of its own: a terminal that is held up, or gone, does not hold up who has them said."""
 
     def __init__(self) -> None:
-        """Start the thread."""
         self._lines: SimpleQueue[str | None] = SimpleQueue()
         self._thread = threading.Thread(target=self._tell, name="teller", daemon=True)
         self._thread.start()

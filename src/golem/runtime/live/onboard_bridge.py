@@ -26,7 +26,6 @@ class CallsIn:
     period = TICK
 
     def __init__(self, bus: Bus, service: str, server: RpcServer) -> None:
-        """Take calls to `service` from `server`."""
         self._bus, self._topic, self._server = bus, topics.api_request(service), server
         self._waiting: deque[ApiRequest] = deque(maxlen=WAITING)
 
@@ -43,7 +42,6 @@ class AnswersOut:
     period = TICK
 
     def __init__(self, bus: Bus, service: str, server: RpcServer) -> None:
-        """Send answers of `service` through `server`."""
         self._news, self._server = News(bus, topics.api_response(service)), server
 
     def step(self, t: float) -> None:
@@ -76,7 +74,6 @@ class CallsOut:
     period = TICK
 
     def __init__(self, bus: Bus, service: str, client: RpcClient, identities: Identities) -> None:
-        """Send calls to `service` through `client`."""
         self._news, self._client = News(bus, topics.api_request(service)), client
         self._identities = identities
         self._unsent: ApiRequest | None = None
@@ -95,7 +92,6 @@ class AnswersIn:
     period = TICK
 
     def __init__(self, bus: Bus, service: str, client: RpcClient, identities: Identities) -> None:
-        """Take answers of `service` from `client`."""
         self._bus, self._topic, self._client = bus, topics.api_response(service), client
         self._identities = identities
         self._waiting: deque[Response] = deque(maxlen=WAITING)

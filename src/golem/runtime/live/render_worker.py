@@ -109,7 +109,6 @@ class RenderWorker:
 
 
 def _work(stack: Stack, seed: int, dds: DdsConfig, link: Connection) -> None:
-    """Make images until the twin hangs up."""
     # Ctrl-C is for the twin, which then hangs up.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_IGN)

@@ -33,7 +33,6 @@ class DamagedFrames:
     """
 
     def __init__(self, limits: SafetyLimits) -> None:
-        """Bear as many as `limits` say."""
         self._most, self._leak, self._level = limits.bad_frames, limits.frame_leak, 0.0
         self.dropped = 0
 

@@ -71,7 +71,6 @@ class SenderWatch:
     """
 
     def __init__(self, participant: CycloneParticipant) -> None:
-        """Look around the domain of `participant` until closed."""
         self.found: tuple[str, ...] = ()
         self._participant = participant
         self._over = threading.Event()

@@ -356,7 +356,6 @@ class SafetyProcess:
             self._base = replace(estimate, t=self._clock())
 
     def _diagnose(self, now: float) -> None:
-        """Say once a second how old everything is."""
         values: dict[str, object] = {"state": self.status.state, "steps per second": self._steps}
         self._steps = 0
         newest = {

@@ -22,7 +22,6 @@ class StatusReports:
     """Sends the verdicts of the gate: at every change, and regularly."""
 
     def __init__(self, endpoints: RoleEndpoints) -> None:
-        """Send through `endpoints`."""
         self._endpoints = endpoints
         self._said: tuple[object, ...] = ()
         self._due = Every(REPORT)

@@ -128,7 +128,6 @@ class SkillActionServer:
             self._tell(self._pursuit, result)
 
     def _tell(self, pursuit: ActiveGoal, result: SkillResult) -> None:
-        """Say how the goal that was pursued has ended."""
         self._pursuit = None
         if pursuit.run.error is not None:
             self._guard.caught("The skill", pursuit.run.error)

@@ -225,7 +225,6 @@ class StackProcess:
         self._skills.hear(silent=self._clock() - self._heard > SILENCE)
 
     def _take_over(self) -> Trigger_Response:
-        """Take the lease for skills from who has it."""
         name = self._skills.take_over()
         return Trigger_Response(True, f"The lease for skills was that of {name or 'nobody'}.")
 

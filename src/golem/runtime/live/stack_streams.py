@@ -55,7 +55,6 @@ class CameraIn:
     period = TICK
 
     def __init__(self, bus: Bus, endpoints: RoleEndpoints, camera: str) -> None:
-        """Bring the exposures of `camera` to `bus`."""
         self._t, self._warned = 0.0, False
         self._bus, self._endpoints, self._camera = bus, endpoints, camera
         self._wanted = detection_requested(bus, camera)
@@ -163,7 +162,6 @@ class RemoteGantry:
     """
 
     def __init__(self, node: RosNode) -> None:
-        """Call through `node`."""
         self._client: Client = node.client("/elastic_band/release", public.TRIGGER)
         self._answer: Future[Trigger_Response] | None = None
         self.on_gantry = True

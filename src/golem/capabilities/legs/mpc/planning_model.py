@@ -195,7 +195,6 @@ class PlanningModel:
         model.actuator_biasprm[:, 0] = self.stance.tau
 
     def _balance(self) -> Stance:
-        """Find the stance of the present upper body."""
         model, data = self._model, self._data
         mujoco.mj_resetData(model, data)
         posture = self.posture.copy()
