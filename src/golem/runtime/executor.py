@@ -150,7 +150,6 @@ class Executor:
         """Schedule `nodes`, which exchange messages over `bus`.
 
         Args:
-            bus: where they meet.
             nodes: in the order of their turns.
             start: a time that is to be a tick [s]; a clock from outside need not start at a multiple of one.
             chain: some of the nodes, which then run as a chain.

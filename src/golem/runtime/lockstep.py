@@ -39,8 +39,6 @@ class LockstepRunner:
     """A stack in execution.
 
     Attributes:
-        stack: what it was built from.
-        bus: every stream.
         executor: the clock.
         estop: the virtual emergency stop, to be pressed.
     """
@@ -49,8 +47,6 @@ class LockstepRunner:
         """Wire the modules of `stack` to `robot`.
 
         Args:
-            stack: what to run.
-            robot: its robot.
             limits: what the safety gate enforces instead of the stack's profile: for studies of the gate.
 
         Raises:

@@ -71,8 +71,6 @@ class NavigatorNode:
 
         Args:
             bus: where goals, map and scan are.
-            navigator: what is run, already checked.
-            contract: names it.
             legs: the lower body, as the running skill reads it.
             pool: where a navigator with a latency runs; None is here, at the price of the latency that it declares.
         """

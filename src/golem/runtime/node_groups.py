@@ -85,7 +85,6 @@ class RobotNodes:
     """The robot with its motors, IMU, hands, cameras and on-board computer.
 
     Attributes:
-        nodes: its nodes.
         act: the one of them that lets time pass.
     """
 
@@ -101,9 +100,6 @@ class RobotNodes:
         """Connect `robot` to `bus`.
 
         Args:
-            bus: where its nodes meet others.
-            stack: what it was built from.
-            robot: the robot.
             wanted: called with the name of a camera, returns what says whether it is to be exposed; None where that
                 is another process's business.
             lidar_wanted: says whether anybody listens to the LiDAR; None where nobody ever does.
@@ -135,7 +131,6 @@ class SafetyNodes:
     """The emergency stop and the gate.
 
     Attributes:
-        nodes: its nodes.
         gate: the one of them that runs the gate.
     """
 
@@ -161,12 +156,7 @@ class StackNodes:
     """Everything that decides what the robot does.
 
     Attributes:
-        stack: what it was built from.
-        bus: its streams.
-        nodes: its nodes.
         legs: the one of them that runs the leg controller.
-        context: what its skills work with.
-        skills: what skills there are.
         running: the one of its nodes that resumes the skill that runs.
         memory: what it remembers; closed with `close` before another stack opens its file.
         remembering: the one of its nodes that feeds it.
@@ -187,8 +177,6 @@ class StackNodes:
         """Build the modules of `stack` around `bus`.
 
         Args:
-            bus: where they meet.
-            stack: which modules.
             calibration: of each camera; see `Robot.calibration`.
             mount: (4, 4) pose of the LiDAR by calibration; None is that of the nominal model.
             gantry: what is let go once the robot stands, or None.

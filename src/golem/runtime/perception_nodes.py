@@ -105,10 +105,6 @@ class LocalizerNode:
         """Run a localizer.
 
         Args:
-            bus: where frames and sightings are.
-            localizer: what is run.
-            camera: whose frames.
-            contract: watches it.
             pool: where it runs; None is here, at the price of the latency that it declares.
         """
         self._bus, self._localizer, self._camera, self._contract = bus, localizer, camera, contract
@@ -211,9 +207,6 @@ class MemoryNode:
         """Feed a memory.
 
         Args:
-            bus: where detections are.
-            memory: what is fed.
-            cameras: whose looks.
             in_map: whether there is a map to wait for.
             epoch: what is added to times of the robot [s]; more where the memory knows later times already.
             pool: where the memory runs; None is here.

@@ -89,7 +89,6 @@ class Arm:
         """Go straight to `T_goal` (4, 4) in odom; ends early once `stop()` is true.
 
         Args:
-            T_goal: where to.
             v_max: speed [m/s].
             w_max: angular speed [rad/s].
             stop: asked every tick.
@@ -328,7 +327,6 @@ class Context:
         `SkillCancelled` pass, however that skill then ended.
 
         Args:
-            name: of the skill.
             goal: of its kind, or its fields by name, as `{"times": 2}`.
             timeout: robot time after which it is cancelled [s]; by default what the skill itself allows.
 
@@ -377,8 +375,6 @@ class Context:
         """Let a camera stream what it sees of `labels`, for as long as the returned `DetectionStream` is open.
 
         Args:
-            camera: which one.
-            labels: classes.
             doubtful: those of them of which unsure sightings are passed on, too, since the caller can tell.
         """
         return DetectionStream(self, camera, labels, doubtful)

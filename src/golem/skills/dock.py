@@ -29,7 +29,6 @@ async def approach(context: Context, navigator: GoTo, target: PlanarPose) -> Non
     """Go straight to a pose in the odometry's frame, and stand, there or after `TIMEOUT`.
 
     Args:
-        context: of the skill.
         navigator: learns with every approach how these legs stop.
         target: where base_link shall be.
 

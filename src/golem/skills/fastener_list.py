@@ -49,7 +49,6 @@ def read_list(path: Path, containers: Collection[str]) -> list[Listed]:
     """Read a CSV file with the columns `class`, `x`, `y`, `z` and, if given, `name`, `loose` (1, 0 or empty), `frame`.
 
     Args:
-        path: of the file.
         containers: classes of what fasteners are put into, which may be listed, too.
 
     Raises:

@@ -57,8 +57,6 @@ async def close_hand(context: Context, side: Side, force: float, patience: float
     still there is found by closing again.
 
     Args:
-        context: whose hand.
-        side: which.
         force: of each finger [N].
         patience: time the fingers may take [s].
     """
@@ -104,8 +102,6 @@ class ForceGuard:
         """Return a guard of a hand that is at rest now, after having felt for `REST` ticks what is there before.
 
         Args:
-            context: whose hand.
-            side: which.
             axis: (3,) direction of the motion in odom, of unit length.
             force: what it may meet [N].
             length: way of the commanded pose along the axis after which nothing more is asked [m].

@@ -111,7 +111,6 @@ def make_plan(
     """Return the stops, in order, from which everything of `wanted` is served that can be.
 
     Args:
-        sides: of the pack.
         wanted: the fasteners to take.
         containers: label of fasteners -> (k, 3) places in the pack frame of what they may be put into; a label without
             is put into what will be seen.

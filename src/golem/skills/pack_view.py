@@ -94,9 +94,6 @@ async def see_fasteners(
     """Return what the head camera shows of fasteners and container; nothing where no frame comes.
 
     Args:
-        context: of the skill.
-        label: class of the fasteners.
-        container: class of the container.
         avoid: (n, 2) in odom, of fasteners that are left out [m].
         around: whether the torso turns to either side where fasteners are in view and no container is.
         wanted: (n, 2) in odom, of the only fasteners that count [m]; without any, all do.

@@ -66,8 +66,6 @@ def _laid_over(before: View, after: View, flat: Array, axis: Array) -> Array:
     """Return the shift by the silhouettes; see `shift_between`.
 
     Args:
-        before: one view.
-        after: the other.
         flat: (3, 2) axes of the silhouettes, across `axis`.
         axis: (3,) along which both look.
     """

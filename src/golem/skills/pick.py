@@ -39,10 +39,6 @@ async def pull(context: Context, config: PickConfig, travel: Travel, attempt: At
     """Pull straight out against the approach direction, then lift; the grip must hold.
 
     Args:
-        context: whose hand.
-        config: distances, speeds and forces.
-        travel: moves it.
-        attempt: what is held.
         heights: at which the palm camera saw it before each pull [m].
 
     Raises:

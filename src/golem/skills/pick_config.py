@@ -89,11 +89,7 @@ class PickReport:
 
 
 class PickFailed(StageFailed):
-    """A stage of a pick failed, and what that says of the object or the work place is known.
-
-    Attributes:
-        outcome: what it says.
-    """
+    """A stage of a pick failed, and what that says of the object or the work place is known."""
 
     def __init__(self, outcome: PickOutcome, stage: str, slot: str, reason: str) -> None:
         """Say what it says, which `stage` failed, whose module is responsible, and why."""

@@ -42,12 +42,7 @@ async def place(
     """Carry what a hand holds over the container and let go.
 
     Args:
-        context: whose hands.
-        config: distances and speeds.
-        travel: moves them.
-        attempt: what is held.
         seen: (3,) where the palm camera saw what the head camera had chosen, in odom [m].
-        choice: has the container.
 
     Raises:
         StageFailed: no place above the container is reached, or the object was lost.

@@ -143,7 +143,6 @@ class HandReach:
         """Return (n,) above which of `places` (n, 3) in odom a hand can let go.
 
         Args:
-            side: which hand.
             places: in odom [m].
             slack: whether those count, too, that the head camera may show a little too far away.
         """
@@ -157,9 +156,7 @@ class HandReach:
         """Return up to `most` of `places` (n, 3) to try: half of them as they come, surely in reach, then near ones.
 
         Args:
-            side: which hand.
             places: in odom [m].
-            most: how many.
         """
         over = self._in_base(side, places + (0.0, 0.0, self._config.drop_height))
         surely = np.flatnonzero(self.drops(side, places, slack=False)).tolist()

@@ -133,7 +133,6 @@ class PlannedMotion:
             hand_speed: how fast the hands may move [m/s].
             then: lines that shall be possible from there.
             rules: what the way has to keep.
-            held: what the hands hold.
             near: distance of a hand from its pose that will do [m].
 
         Raises:
@@ -226,8 +225,6 @@ class PlannedMotion:
         """Go straight to `T_goal` (4, 4) in odom, if the hand can keep to the line; see `Arm.move`.
 
         Args:
-            side: which hand.
-            T_goal: where to.
             v_max: speed [m/s].
             stop: asked every tick.
             tolerance: how far the hand may leave the line, distance [m] and angle [rad].

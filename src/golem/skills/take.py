@@ -35,7 +35,6 @@ def reached_first(context: Context, side: Side, grasps: Sequence[Grasp], before:
 
     Args:
         context: where the arms are.
-        side: which hand.
         grasps: best first.
         before: distance from a grasp, along its approach, from which the hand comes [m].
     """

@@ -89,7 +89,6 @@ class LineTravel:
         """Remember where the hands are.
 
         Args:
-            context: whose hands.
             height: least height of a hand that moves across, in odom [m].
             tolerance: distance from a pose at which the arm counts as arrived [m].
         """
@@ -139,7 +138,6 @@ class PlannedTravel:
         """Remember where the arms are.
 
         Args:
-            context: whose hands.
             lines: the way home when there is no planned one.
             tolerance: distance from a pose at which the arm counts as arrived [m].
         """

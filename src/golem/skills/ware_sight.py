@@ -51,8 +51,6 @@ async def find(
     """Return the thing of a class that the head camera shows, the one nearest to where it is expected.
 
     Args:
-        context: whose camera.
-        label: class of the thing.
         near: x, y in odom where it is expected [m]; None: the one that is told most surely.
         timeout: how long to look [s].
 

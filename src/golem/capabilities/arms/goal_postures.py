@@ -63,7 +63,6 @@ class GoalPostures:
             free: says of a posture (15,) whether it may be gone to.
             most: how many are enough.
             random_starts: how many starts besides `q` and the named postures are tried while none is found.
-            seed: of those starts.
 
         Raises:
             TargetError: a target is no rigid transform.

@@ -32,7 +32,6 @@ class HandForce:
         """Return the (3,) force that a hand exerts on what it touches, in base_link [N].
 
         Args:
-            side: which hand.
             q: (15,) joints of torso, left arm, right arm [rad].
             tau: (15,) their torques [N m].
         """

@@ -148,7 +148,6 @@ def descend(
         grip: (4, 4) the grasp frame, at zero.
         lower: (7,) range of the arm [rad].
         upper: (7,) its other end.
-        steps: how many.
     """
     n = len(q)
     here, tip, at = np.empty((3, 3)), np.empty(3), np.empty((n, 2, 3))

@@ -146,7 +146,6 @@ class LineChecker:
         """Return what the arm would do on the way to `T_goal`, if it may; what it touches already it may leave.
 
         Args:
-            side: which hand.
             T_goal: (4, 4) where it is to go, in base_link.
             q: (15,) command state of the joints that it starts from [rad].
             v_max: speed [m/s].

@@ -36,7 +36,6 @@ class QuickIK:
         """Return the (15,) joints that put the hand at `T` (4, 4), in base_link; None where no start leads there.
 
         Args:
-            side: which hand.
             T: where the grasp frame is to be.
             starts: (n, 15) joints to begin with, in the order in which they are tried [rad].
             iterations: how many steps each start gets.
@@ -54,7 +53,6 @@ class QuickIK:
         """Return the (15,) joints from which the hand comes and those at `T` (4, 4); None where it does not.
 
         Args:
-            side: which hand.
             T: where the grasp frame is to be, in base_link.
             before: distance from `T`, along its approach, from which the hand comes [m].
             starts: see `solve`.

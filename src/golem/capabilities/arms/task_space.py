@@ -121,7 +121,6 @@ class TaskSpaceController(ABC):
 
     Attributes:
         rate, latency: see `UpperBody`.
-        config: the options.
         task: its memory, which a subclass reads; see `task_kernel.IkMemory`.
         lower, upper: (15,) position limits it keeps, margin and torso range included [rad]; a waist that starts outside
             that range comes back to it; so does an arm once it has a target.

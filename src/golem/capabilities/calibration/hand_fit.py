@@ -31,9 +31,7 @@ def fit_hand(views: Sequence[TagView], camera: Side, info: CameraInfo, zero: flo
     """Return the calibration of one palm camera that explains the views best; joints are left alone.
 
     Args:
-        views: of the other hand.
         camera: the side whose hand carries the camera.
-        info: of the camera.
         zero: standard deviation of what the arms' zeros are off by [rad].
 
     Raises:
@@ -114,7 +112,6 @@ def hand_view_postures(
 
     Args:
         camera: the side whose palm camera looks at the other hand.
-        count: how many.
         free: says of a posture whether it may be gone to.
         spheres: returns the (m, 4) spheres of the robot in a posture, centres in base_link and radii [m].
         zero: standard deviation of the arms' zeros [rad].

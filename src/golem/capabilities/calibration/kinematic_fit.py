@@ -64,7 +64,6 @@ def fit(views: Sequence[TagView], info: CameraInfo) -> Calibration:
 
     Args:
         views: of both hands.
-        info: of the head camera.
 
     Raises:
         ConfigError: too few views of a hand.
@@ -95,7 +94,6 @@ def information(side: Side, q: Array, tags: Sequence[int]) -> Array:
     """Return what a view would tell of mount, the arm's zeros and the cuff, (19, 19), in units of their priors.
 
     Args:
-        side: which hand is seen.
         q: (27,) joints [rad].
         tags: which of its tags are.
     """

@@ -82,7 +82,6 @@ def fit_lidar(views: Sequence[SurfaceView], info: CameraInfo, head: Array, head_
 
     Args:
         views: with the torso at different angles, or of surfaces that face different ways.
-        info: of the head camera.
         head: (4, 4) pose of its optical frame in the nominal one, by its calibration.
         head_covariance: (6, 6) of that pose.
 
@@ -125,7 +124,6 @@ def planes_of(depth: Sequence[NDArray[np.float32]], info: CameraInfo) -> Array:
 
     Args:
         depth: (h, w) of each image [m]; see `SurfaceView`.
-        info: of the camera.
     """
     stack = np.stack(depth).astype(np.float64)
     valid = stack > 0.0

@@ -45,8 +45,6 @@ def view_postures(
     """Return up to `count` postures (15,) of torso and arms; the other arm is at home.
 
     Args:
-        side: which hand is seen.
-        count: how many.
         free: says of a posture whether it may be gone to.
         spheres: returns the (m, 4) spheres of the robot in a posture, centres in base_link and radii [m].
         seed: of the draws.
@@ -98,7 +96,6 @@ def visible(info: CameraInfo, tags: Array, margin: float, distances: tuple[float
     """Return (n,) whether a camera sees a tag at each of its poses if nothing hides it.
 
     Args:
-        info: of the camera.
         tags: (n, 4, 4) poses of the tag in the optical frame.
         margin: how far inside the image its middle has to be [px].
         distances: least and greatest [m].

@@ -41,7 +41,6 @@ class CollisionModel:
 
     Attributes:
         joints: names of the n joints, in the order of `q`.
-        robot: what it was made from.
         ints, floats: the model as `sphere_kernel` reads it.
         sphere_body: (m,) body that each sphere is part of, 0 for the base.
         sphere_link: (m,) its link.

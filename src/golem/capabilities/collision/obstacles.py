@@ -175,7 +175,6 @@ class World:
     """What stands around the robot: shapes, and at most one cloud.
 
     Attributes:
-        obstacles: the shapes.
         cloud: the cloud, if there is one.
     """
 

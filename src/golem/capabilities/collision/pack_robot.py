@@ -62,9 +62,6 @@ def sample_postures(links: Sequence[LinkGeometry], n: int, seed: int, still: Seq
     """Return (n, joints) postures: the first half around zero, the others anywhere in the ranges.
 
     Args:
-        links: of the robot.
-        n: number of postures.
-        seed: of the samples.
         still: joints that stay at zero.
     """
     rng = np.random.default_rng(seed)
@@ -221,7 +218,6 @@ def pack_robot(name: str, links: tuple[LinkGeometry, ...], config: SpheresConfig
     """Pack the links of a robot.
 
     Args:
-        name: of the robot.
         links: with surfaces.
         config: how; `file` and `out` are not looked at.
 

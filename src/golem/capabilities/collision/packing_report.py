@@ -63,9 +63,7 @@ def coverage(link: str, surface: LinkSurface, packing: Packing, seed: int = 1) -
     """Measure the spheres of one link.
 
     Args:
-        link: its name.
         surface: samples that the packer has not seen.
-        packing: its spheres.
         seed: of the points that the volume is measured with.
     """
     gaps = packing.gap(surface.points)
@@ -94,8 +92,6 @@ def score_collisions(
     """Compare spheres and meshes.
 
     Args:
-        robot: its spheres.
-        links: its links with surfaces.
         oracle_pairs: (n, 2) links that the meshes are tested for.
         postures: (n, joints) of which the packer has seen none.
     """

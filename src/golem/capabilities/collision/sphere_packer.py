@@ -52,7 +52,6 @@ def pack(surface: LinkSurface, kind: SphereKind, tolerance: float, most: int, se
     """Return the spheres of a link.
 
     Args:
-        surface: of the link.
         kind: tight or conservative.
         tolerance: how far a sphere may stand out [m]; widened until `most` spheres suffice.
         most: bound on the number of spheres.

@@ -137,7 +137,6 @@ def holding(robot: SphereRobot, hand: str, held: Packing, name: str = "held") ->
         robot: with empty hands.
         hand: name of the link that holds.
         held: spheres of the object in the frame of that link.
-        name: of the object.
 
     Raises:
         ConfigError: no such link, or the name is one already.

@@ -69,7 +69,6 @@ def link_surface(name: str, parts: Sequence[SurfacePart], seed: int = 0) -> Link
     Args:
         name: of the link, for messages.
         parts: at least one mesh with an area.
-        seed: of the samples.
 
     Raises:
         ConfigError: a mesh is not finite.

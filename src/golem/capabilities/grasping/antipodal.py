@@ -111,7 +111,6 @@ class Antipodal(OpenLoop):
     """Grasps on pairs of points that hold by friction, free of what the cloud shows; see `GraspMethod`.
 
     Attributes:
-        config: its options.
         latency: declared time of a proposal [s].
     """
 

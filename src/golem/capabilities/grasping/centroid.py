@@ -75,7 +75,6 @@ class Centroid(OpenLoop):
     """One grasp on the object's centre, along the approach that the task wants: straight down, or forward.
 
     Attributes:
-        config: its options.
         latency: none: a proposal takes a few microseconds.
     """
 

@@ -65,7 +65,6 @@ class GraspGen(OpenLoop):
     """Grasps of a GraspGen server, in the order of its confidences; see `GraspMethod`.
 
     Attributes:
-        config: its options.
         latency: declared time of a proposal [s].
     """
 

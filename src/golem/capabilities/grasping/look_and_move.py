@@ -69,7 +69,6 @@ class StopAndGo:
     """A servo law that asks another one once per cycle, and sends the hand a part of the way; see `ServoLaw`.
 
     Attributes:
-        label: what it follows.
         patience: of the other law [s].
     """
 
@@ -103,11 +102,7 @@ class StopAndGo:
 
 
 class LookAndMove(VisualServo):
-    """Centroid grasp, corrected by the palm camera between moves; see `GraspMethod`.
-
-    Attributes:
-        config: its options.
-    """
+    """Centroid grasp, corrected by the palm camera between moves; see `GraspMethod`."""
 
     config: LookAndMoveConfig
 

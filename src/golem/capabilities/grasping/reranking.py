@@ -92,7 +92,6 @@ class Reranking:
     proposer's order.
 
     Attributes:
-        config: its options.
         latency: that of both together [s].
     """
 
@@ -152,7 +151,6 @@ class Reranking:
 
         Args:
             grasps: best first.
-            gripper: the hand.
             q: (15,) where the joints are [rad].
             space: the postures that are free.
             T_base_odom: (4, 4) pose of odom in base_link.

@@ -107,7 +107,6 @@ class Scorer(OpenLoop):
     """Antipodal grasps, the one that most probably holds first; see `GraspMethod`.
 
     Attributes:
-        config: its options.
         latency: of proposals and network together [s].
     """
 

@@ -263,7 +263,6 @@ class VisualServo:
     """Centroid grasp, refined by the palm camera at image rate.
 
     Attributes:
-        config: its options.
         latency: that of `Centroid`.
     """
 

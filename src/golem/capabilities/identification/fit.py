@@ -94,7 +94,6 @@ def identify(motion: RecordedMotion, weight: float | None = None) -> Identified:
     """Identify the robot that moved.
 
     Args:
-        motion: what it did.
         weight: its mass as a scale between hook and robot shows it, hands and payload included [kg].
 
     Raises:

@@ -259,7 +259,6 @@ class GaitClock:
         """Advance by `dt` [s]; return what to command so that the robot moves at `twist`: (3,), vx, vy, wz.
 
         Args:
-            state: measured joints and IMU.
             base: estimated pose and velocity of base_link.
             twist: what the robot shall move at.
             dt: time since the previous step [s].

@@ -50,7 +50,6 @@ class CommandBlender:
         """Return what the legs are told `dt` [s] after the previous tick instead of `command`.
 
         Args:
-            command: of the controller in charge.
             dt: time since the previous tick [s].
             old: what the one before says now, if it goes on; else the command given to `begin` stays.
         """

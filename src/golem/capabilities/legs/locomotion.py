@@ -62,8 +62,6 @@ class FootSeparation:
         """Return what the legs are told instead of `command`.
 
         Args:
-            command: of the controller.
-            state: measured joints.
             swings: (2,) whether the left and the right leg swing, and carry no load.
         """
         if not swings.any():
@@ -130,13 +128,11 @@ class Locomotion:
     """Runs one leg controller, or another one after a hand-over, under one twist and one gait clock.
 
     Attributes:
-        config: options.
         commanded: the newest twist, as it came; zero for one that is not finite.
         applied: the twist the robot shall move at; the controller gets it with the trim's correction.
         height: the height it shall have now [m]; None is the controller's own.
         clamped: whether the commanded twist lies outside the controller's envelope.
         reason: why the controller does not get the commanded twist; empty where it does, slewing aside.
-        gait: the gait clock.
         motion: what the controller was asked for last.
         runs: how often the controller in charge was run.
     """
@@ -187,7 +183,6 @@ class Locomotion:
 
         Args:
             controller: the controller that is in charge from now on.
-            state: measured joints and IMU.
             last: the last sound command, from which the targets lead over to those of `controller`.
         """
         self._forget()
@@ -201,7 +196,6 @@ class Locomotion:
         """Advance by one tick.
 
         Args:
-            state: measured joints and IMU.
             base: estimated pose and velocity of base_link.
             twist: a twist that was commanded since the previous tick, or None.
             dt: time since the previous tick [s], positive.

@@ -234,7 +234,6 @@ class ObservationLayout:
         """Return the (size,) observation of one robot: all about the base as estimated, its rate by the torso IMU.
 
         Args:
-            state: joints and IMU.
             base: estimated pose and velocity of base_link.
             motion: what the base layer asks for.
             action: (12,) or (27,) the policy's last action, by motor.

@@ -11,7 +11,6 @@ class RateDivider:
     """Steps a controller whenever its period has passed; in between its last command stands.
 
     Attributes:
-        controller: the controller.
         runs: how often it was run.
     """
 

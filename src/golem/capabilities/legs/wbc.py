@@ -117,7 +117,6 @@ class Wbc:
     """The stance controller; it ignores the twist, and its envelope has heights only.
 
     Attributes:
-        config: its options.
         rate, latency, envelope, gait: see `LowerBody`.
     """
 

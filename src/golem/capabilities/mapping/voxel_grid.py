@@ -213,7 +213,6 @@ class VoxelGridMapper:
     """See `Mapper`; one scan costs some milliseconds.
 
     Attributes:
-        config: its options.
         rate: grids per second [Hz].
         before: the map from before; None where the options name none.
     """

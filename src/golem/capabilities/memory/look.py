@@ -39,7 +39,6 @@ def look_at(frame: RgbdImage, positions: Array, sizes: Array, sigmas: Array) -> 
     """Return what the frame says of objects that it did not detect.
 
     Args:
-        frame: the exposure.
         positions: (n, 3) where they are expected, in the frame of `frame.T_odom_optical` [m].
         sizes: (n,) their radii [m].
         sigmas: (n,) standard deviations of their positions, relative to the frame [m].

@@ -61,10 +61,8 @@ class Costmap:
         """Inflate the obstacles of a map and of a scan.
 
         Args:
-            grid: the map.
             points: (n, 2) obstacles in the frame of the map that are not in it yet [m]; those beside it are left out.
             radius: inscribed radius of the robot [m].
-            config: options.
         """
         config = config or CostmapConfig()
         self.origin, self.resolution, self.shape = grid.origin, grid.resolution, grid.cells.shape

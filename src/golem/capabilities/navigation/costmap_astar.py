@@ -154,7 +154,6 @@ class CostmapAstar:
     """See `Navigator`.
 
     Attributes:
-        config: its options.
         rate: steps per second [Hz].
         latency: time of a step with a search [s].
     """

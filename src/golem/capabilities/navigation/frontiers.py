@@ -32,7 +32,6 @@ def frontiers(grid: OccupancyGrid, radius: float, base: PlanarPose, standoff: fl
     """Return the frontiers of a map that can be looked at, the one that is worth most for its way first.
 
     Args:
-        grid: the map.
         radius: distance that the robot keeps from obstacles [m].
         base: where the robot is, in the frame of the map's origin.
         standoff: distance from which a frontier is looked at [m].

@@ -87,7 +87,6 @@ class GoTo:
     """Follows the straight line to the goal; see `Navigator`.
 
     Attributes:
-        config: its options.
         rate: steps per second [Hz].
         latency: none: a step takes some 50 microseconds.
     """

@@ -182,7 +182,6 @@ class LocalController:
             pose: of base_link in the frame of the map.
             way: where to go.
             goal: where that ends.
-            footprint: of the robot.
             clearance: of the window around the robot, see `local_controller.score`.
             frame: of that window.
             people: those who walk, likewise.

@@ -77,7 +77,6 @@ class Nav2:
     """See `Navigator`.
 
     Attributes:
-        config: its options.
         rate: steps per second [Hz].
         latency: none: Nav2 takes what it takes.
     """

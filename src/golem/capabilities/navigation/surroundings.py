@@ -36,7 +36,6 @@ class Surroundings:
         """Wait for a map.
 
         Args:
-            config: of the costmap.
             shy: see `clearance` [m].
             ahead: time for which the way of those who walk is kept free [s]; 0 takes everything for standing.
         """
@@ -62,7 +61,6 @@ class Surroundings:
         """Take what is known now.
 
         Args:
-            grid: the newest map.
             scan: the newest scan; None if there is none that counts.
             pose: where the robot is.
             radius: within which of an obstacle no way leads [m].

@@ -65,7 +65,6 @@ class ErrorState:
             t: time [s].
             begin: where, and how.
             yaw: of the sensor [rad].
-            noise: of the IMU.
         """
         self.t, self.R, self.noise = t, begin.R.copy(), noise
         self.x: Array = np.concatenate([begin.p, begin.velocity, begin.gyro_bias, np.zeros(5), [yaw]])

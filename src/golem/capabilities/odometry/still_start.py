@@ -57,7 +57,6 @@ class StillStart:
         """Take a sample.
 
         Args:
-            sample: of the IMU.
             waist: position of `torso_joint` [rad].
 
         Returns:

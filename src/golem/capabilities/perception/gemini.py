@@ -48,7 +48,6 @@ class Gemini:
     """Objects of any name, by one question per frame; see `Localizer`. What it answers may differ from day to day.
 
     Attributes:
-        config: its options.
         latency: declared time per frame [s].
     """
 
@@ -94,8 +93,6 @@ def read_boxes(text: str, labels: Sequence[str], size: tuple[int, int]) -> list[
     Entries of other labels, and those that are no box within the image, are left out.
 
     Args:
-        text: its words.
-        labels: what was asked for.
         size: height and width of the image [px].
 
     Raises:

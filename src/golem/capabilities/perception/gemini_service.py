@@ -73,7 +73,6 @@ class GeminiService:
         """Take the key from the environment.
 
         Args:
-            config: how it is asked.
             who: what needs the key, in the sentence that misses it.
             instead: what helps where there is none.
             sleep: lets time pass between two tries [s].

@@ -143,7 +143,6 @@ class OpenWords(ABC):
     """A detector that takes any words; see `Localizer`.
 
     Attributes:
-        config: its options.
         latency: declared time per frame [s].
     """
 

@@ -47,9 +47,6 @@ def find_peaks(
 
     Args:
         maps: (classes + 6, h, w): logits, then the centre's offset [cells] and the log distances to the box's sides.
-        labels: names of the classes.
-        wanted: the classes to return.
-        threshold: smallest score.
         size: width and height of the image [px]; boxes are clipped to it and centres outside dropped.
     """
     width, height = size

@@ -82,7 +82,6 @@ class PlaneClusters:
     """Handles on doors, and mugs, bowls, cans and bottles on tables, by depth alone; see `Localizer`.
 
     Attributes:
-        config: its options.
         classes: the labels that it knows.
         latency: declared time per frame [s].
     """

@@ -60,7 +60,6 @@ class YoloWorld:
     """The classes that the user's export knows; see `Localizer`.
 
     Attributes:
-        config: its options.
         classes: labels, in the order of the network's.
         latency: declared time per frame [s].
     """

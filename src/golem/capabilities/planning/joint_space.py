@@ -90,7 +90,6 @@ class JointSpace:
     """The postures that one request allows.
 
     Attributes:
-        robot: the robot.
         space: as the kernel reads it.
         rules: those of the request.
     """
@@ -107,11 +106,8 @@ class JointSpace:
         """Lay out the tables.
 
         Args:
-            robot: the robot.
             q: (15,) where the joints are at the start [rad]; `Balanced` counts from there.
-            world: what stands around.
             rules: what a posture has to keep besides.
-            held: what the hands hold.
             margins: distances between conservative spheres that are kept, of the robot from itself and from the
                 world [m].
         """

@@ -188,7 +188,6 @@ class PathPlanner(ABC):
 
     Attributes:
         latency: see `ArmPlanner`.
-        config: the options.
         robot: what of the robot does not change.
         speed, accel: (15,) limits of the joints [rad/s, rad/s^2].
     """

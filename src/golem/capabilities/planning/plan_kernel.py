@@ -206,7 +206,6 @@ def grow(
         reach: longest edge [rad in a joint].
         step: longest step between two checks [rad in a joint].
         weight: (n,) of each joint in the distance that finds the nearest node.
-        space: what is free.
         checks: (1,) counts postures checked.
     """
     for i in range(len(samples)):

@@ -30,7 +30,6 @@ def straight_line(space: JointSpace, q: Array, goals: Array, effort: Effort, ste
     """Return the corners (2, 15) of the straight line to the nearest goal that has a free one, or None.
 
     Args:
-        space: what is free.
         q: (15,) start.
         goals: (k, 15).
         effort: what may be spent.

@@ -28,7 +28,6 @@ class GeminiEstimate:
     """Mass, friction and stiffness as a language model estimates them; see `PropertySource`.
 
     Attributes:
-        config: its options.
         latency: declared time of an answer [s].
     """
 

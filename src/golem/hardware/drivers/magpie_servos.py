@@ -258,7 +258,6 @@ class MagpieServos:
         """Open the bus; nothing moves before the first command.
 
         Args:
-            config: its options.
             connect: opens a port by name and baud rate.
 
         Raises:

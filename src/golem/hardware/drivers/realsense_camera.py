@@ -111,7 +111,6 @@ class RealSense:
 
         Args:
             camera: name, depth range and rate; what else it says is replaced by what the device says.
-            start: starts the device.
             now: clock of the stamps [s].
             wall: this machine's wall clock [s], in which newer cameras stamp.
 

@@ -112,7 +112,6 @@ class InvariantFilter:
     """The filter.
 
     Attributes:
-        config: its noise.
         memory: all it knows; the next five are views of it.
         R: (3, 3) rotation of the IMU in odom.
         x: (4, 3) velocity of the IMU, its position, the left and the right contact point, in odom [m/s], [m].

@@ -60,11 +60,7 @@ class MagpieConfig:
 
 
 class MagpieHand:
-    """One MAGPIE hand; opens fully when it starts.
-
-    Attributes:
-        config: its options.
-    """
+    """One MAGPIE hand; opens fully when it starts."""
 
     def __init__(self, config: MagpieConfig | None = None) -> None:
         self.config = config or MagpieConfig()

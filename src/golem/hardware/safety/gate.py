@@ -59,7 +59,6 @@ def check(inputs: GateInputs, limits: SafetyLimits, memory: GateMemory) -> GateR
     Args:
         inputs: time, newest frames, request. Frames that repeat or arrive out of order are recognised by their
             stamps (and sequence) and never refresh an age; a frame that says "pressed" counts however late it is.
-        limits: what to compare with.
         memory: that of the previous result; `GateMemory()` at the start.
 
     Returns:

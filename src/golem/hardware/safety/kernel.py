@@ -37,7 +37,6 @@ def limited(
 
     Args:
         numbers: (297,) the command; q and dq as measured; q, kp, kd, tau of the last command.
-        table: the limits.
         dt: time since the last command [s].
         loaded: whether the last feed-forward bounds the new one.
         strained: whether joints are braked.
@@ -103,7 +102,6 @@ def rate_state(numbers: Array, table: Array, jump: float, upright: float) -> int
 
     Args:
         numbers: (118,) the state, then q of the sample before.
-        table: the limits.
         jump: how far a joint may have moved since [rad].
         upright: least cosine of the torso's tilt.
     """
@@ -146,7 +144,6 @@ def ordinary_command(
 
     Args:
         numbers: (270,) the command, then the one before it.
-        table: the limits.
         one: most that may be asked of a leg's motor beyond the last command, in shares of its torque limit.
         constants: the same of the constant torques of the legs' motors together.
         all_: the same of the legs' motors together.

@@ -41,7 +41,6 @@ def limit_command(
         t: stamp of the result [s].
         state: measured state the torque is predicted at.
         command: finite command, arrays (27,).
-        limits: the limits.
         last: what the previous call returned.
         dt: time since then [s].
         strained: whether a joint may be too fast, or too close to the end of its range for its speed. It is then

@@ -51,9 +51,7 @@ def quickly(state: LowState, before: Array, limits: SafetyLimits, jump: float) -
     """Return the counters of a sample that is `whole`, has not jumped, and breaks no limit, in one call; else None.
 
     Args:
-        state: the sample.
         before: (27,) positions of the sample before [rad].
-        limits: what to compare with.
         jump: how far a joint may have moved since then [rad].
     """
     imu = state.imu
@@ -82,7 +80,6 @@ def examine(state: LowState, limits: SafetyLimits, counters: Counters) -> tuple[
 
     Args:
         state: a sample that `whole` accepts.
-        limits: what to compare with.
         counters: consecutive bad samples before this one.
 
     Returns:

@@ -58,7 +58,6 @@ def examine_command(
     Args:
         new: the command, arrays (27,).
         memory: of the commands before it.
-        limits: what to compare with.
         carries: whether feet carry the robot.
         late: whether legs have had their time to become stiff.
 

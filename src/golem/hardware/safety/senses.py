@@ -100,7 +100,6 @@ def sense(
         state: one that is finite.
         tick: the robot's own time of it [s].
         memory: of the samples before it.
-        limits: what to compare with.
         sent: what the motors were told last while something drives them; None else, and a jump is then believed.
         smooth: whether it is known that no joint has jumped.
 

@@ -43,7 +43,6 @@ def looked(
     Args:
         numbers: the state, the state looked at before (91 each); drift and dead (27 each); asked (486); q, dq, tau,
             kp, kd of the command; turn and force (3 each).
-        table: the limits.
         dt: time between the two states [s].
         keep: share of the differences that is not forgotten.
         share: share of the new specific force in its mean.

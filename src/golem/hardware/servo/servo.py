@@ -144,7 +144,6 @@ class Servo:
     """The motor servo of all 27 joints.
 
     Attributes:
-        config: its options.
         stage: its compiled step; in a chain it is called without this class, with the same memory.
         gains: gains at full stiffness.
         bias: (27,) integral torque [N m].

@@ -88,7 +88,6 @@ class BagFile:
     """One MCAP file of a bag.
 
     Attributes:
-        path: where it is.
         finished: whether its writer completed it.
         foreign: see `Bag`.
         custom: what its writer said about the bag.

@@ -83,7 +83,6 @@ class ActionClient:
         """Propose a goal; the future brings the server's decision.
 
         Args:
-            goal: the action's goal message.
             feedback: called with each of the goal's feedback messages.
             id: 16 bytes to know it by; random if None.
 

@@ -30,9 +30,6 @@ class DiscoveryInfo:
         """Announce node `name` in `namespace`, without endpoints yet.
 
         Args:
-            participant: whose node it is.
-            namespace: of the node.
-            name: of the node.
             distro: `"humble"` for peers of that distribution, `"jazzy"` for all since.
 
         Raises:

@@ -25,8 +25,6 @@ def message_class(name: str, definition: Definition, of: Callable[[str], type[An
     """Return a class for messages of type `name`.
 
     Args:
-        name: the type.
-        definition: its constants and fields.
         of: gives the class of a type that a field is made of.
         module: what the class gives as its module.
     """

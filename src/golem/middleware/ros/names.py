@@ -53,8 +53,6 @@ def resolve(name: str, node: str, namespace: str) -> str:
 
     Args:
         name: absolute (`/a/b`), relative to the namespace (`a/b`), or private to the node (`~/a`).
-        node: name of the node.
-        namespace: namespace of the node.
 
     Raises:
         ConfigError: it is none of these.

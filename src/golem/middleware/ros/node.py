@@ -64,7 +64,6 @@ class RosNode:
     """A named member of the ROS graph, the one node of its participant.
 
     Attributes:
-        name: without namespace.
         namespace: absolute, or `/`.
         now: the node's clock [s].
         guard: keeps what callbacks raise.

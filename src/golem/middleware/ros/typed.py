@@ -13,7 +13,6 @@ def check(where: str, message: Any, kind: type[Any]) -> None:
 
     Args:
         where: what prescribes it, e.g. `"Topic '/chatter'"`.
-        message: what somebody wants to send.
         kind: class of the messages that may be sent.
 
     Raises:

@@ -37,7 +37,6 @@ def encode_low_state(state: LowState, mode_machine: int = MODE_MACHINE) -> bytes
     """Return `state` as a `LowState_`; accelerations of the joints and temperatures are zero.
 
     Args:
-        state: what the robot measures.
         mode_machine: the machine type it reports.
 
     Raises:
@@ -123,7 +122,6 @@ def decode_low_command(payload: Payload, t: float, mode_machine: int = MODE_MACH
     """Return the command in a `LowCmd_`; a motor that is off gets zero gains and zero torque.
 
     Args:
-        payload: what was received.
         t: when [s]: the message does not say.
         mode_machine: the machine type this robot reports. Robots of this family silently ignore commands for another
             (users' reports on the G1: LeCAR-Lab/ASAP issue 81, NVlabs/GR00T-WholeBodyControl pull request 11).

@@ -86,8 +86,6 @@ def read_geometry(
     """Read a URDF or MJCF file.
 
     Args:
-        file: the file.
-        choice: which surfaces.
         packages: folders of ROS packages by name; others are looked for, see `mesh_file.find_mesh`.
 
     Raises:

@@ -33,7 +33,6 @@ def find_mesh(name: str, file: Path, packages: Mapping[str, Path], folder: str =
 
     Args:
         name: as it stands in the file.
-        file: of the robot.
         packages: folders of packages by name.
         folder: MuJoCo's `meshdir`.
     """

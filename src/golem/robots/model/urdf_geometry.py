@@ -156,8 +156,6 @@ def read_urdf(root: ET.Element, file: Path, choice: GeometryChoice, packages: Ma
 
     Args:
         root: its element `robot`.
-        file: where it is.
-        choice: which surfaces.
         packages: folders of ROS packages by name.
 
     Raises:

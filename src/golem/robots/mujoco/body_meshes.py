@@ -76,7 +76,6 @@ def body_meshes(model: mujoco.MjModel, data: mujoco.MjData, *, collision: bool =
     """Return per moving body its visual geoms in the body's frame, joined where they look the same.
 
     Args:
-        model: the model.
         data: its kinematics place what cannot move (body 0, world frame).
         collision: whether what collides is returned instead, in one colour.
     """

@@ -41,7 +41,6 @@ class CameraRig(AbstractContextManager["CameraRig", None]):
         Args:
             model: has a fixed camera of every info's name that `views` lacks; its field of view is not used, the
                 info's intrinsics are.
-            infos: the cameras.
             fancy: for figures and films: shadows, reflections and smooth edges.
             views: a spectator's cameras, by the name of their info: the model need not have these.
 

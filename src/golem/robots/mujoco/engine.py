@@ -58,10 +58,8 @@ class MujocoRobot:
         """Build the world of one episode.
 
         Args:
-            profile: realism profile.
             seed: draws screws, terrain, calibration errors, noise and sway.
             posture: (27,) true joint positions to start from [rad]; arms that hang start as they hang.
-            config: options.
 
         Raises:
             ConfigError: the profile or an option does not exist.
@@ -211,7 +209,6 @@ class MujocoRobot:
 
         Args:
             force: (3,) in the world [N]; zero ends the push.
-            body: a link of the body.
             point: (3,) where it acts, in the link's frame [m]; None is the link's centre of mass.
 
         Raises:

@@ -167,7 +167,6 @@ class LidarSensor:
 
         Args:
             scene: world and robot; a copy is kept.
-            profile: realism profile.
             seed: draws mounting error, bias and noise.
             mount: (4, 4) pose of the real lidar_link in the nominal one instead of the draw.
             dropout: share of lost points instead of the profile's.

@@ -184,7 +184,6 @@ class Motors:
             delay: time from a command being given to its torque [s].
             memory: where they remember, a `MOTORS`; None is a place of their own.
             errors: of what they report; None reports what is.
-            rng: draws those.
             backlash: play of the gears between rotor, whose encoder reports, and link [rad].
 
         Raises:

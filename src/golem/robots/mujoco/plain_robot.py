@@ -41,11 +41,7 @@ def plain_model(path: Path | None = None) -> mujoco.MjModel:
 
 
 class PlainRobot:
-    """The robot in plain MuJoCo, one physics step per tick.
-
-    Attributes:
-        truth: where it is.
-    """
+    """The robot in plain MuJoCo, one physics step per tick."""
 
     def __init__(self, path: Path | None, posture: Array) -> None:
         """Stand in `posture` (27,) [rad] on the floor of `plain_model`."""

@@ -119,7 +119,6 @@ def build_scene(config: MujocoConfig, layout: PackLayout, profile: RealismProfil
     """Compile the world of one seed.
 
     Args:
-        config: robot and world.
         layout: where the pack nominally stands; x, y from where the robot should stand, z from the floor.
         profile: ranges of the screws.
         seed: draws screws or terrain.

@@ -88,7 +88,6 @@ class SpectatorView:
         """Look at `robot` and its world.
 
         Args:
-            robot: the twin.
             shots: a spectator's cameras by name, besides the robot's own.
             size: width and height of the shots' pictures [px].
             fancy: shadows, reflections, smooth edges: a second and more per picture on a CPU.

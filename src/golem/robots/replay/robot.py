@@ -68,8 +68,6 @@ class Log:
         cameras: those that were recorded.
         calibration: per camera the (4, 4) pose of its optical frame, as the recorded robot's calibration claims it, in
             that of the nominal model.
-        states: motors and IMU.
-        hands: each hand.
         pictures: what each camera saw.
         end: time of the last state; None until it has been read.
     """

@@ -27,9 +27,6 @@ T_MUJOCO_OPTICAL.setflags(write=False)
 def rays(info: CameraInfo) -> NDArray[np.float32]:
     """Return the viewing ray of every pixel, scaled so that ray times depth is the point.
 
-    Args:
-        info: the camera.
-
     Returns:
         (height, width, 3) read-only, in the optical frame, third component 1.
     """
@@ -46,7 +43,6 @@ def project(info: CameraInfo, points: Array) -> Array:
     """Return the pixels of points.
 
     Args:
-        info: the camera.
         points: (..., 3) in the optical frame [m], z > 0.
 
     Returns:

@@ -27,7 +27,6 @@ class LocoService:
     """Answers calls; whoever moves the legs asks it for the state and the twist.
 
     Attributes:
-        api: its numbers.
         state: id of the present state.
         standing: whether the legs have reached the standing posture; set by whoever moves them.
         failure: why the legs cannot be controlled; empty while they can. Set by whoever moves them.

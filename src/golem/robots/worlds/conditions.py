@@ -200,8 +200,6 @@ def draw_fasteners(layout: PackLayout, conditions: Conditions, reach_y: float, r
     no hand carries a screw across. What a hand cannot come to for the tray stays tight.
 
     Args:
-        layout: has the places.
-        conditions: the shares.
         reach_y: fasteners with |y| up to this take part [m].
         rng: the same state draws the same.
     """

@@ -144,7 +144,6 @@ def add_furnished_hall(spec: mujoco.MjSpec, rng: np.random.Generator, *, bare: b
     """Add a hall with walls, shelves, pillars, a gantry, two packs on stands and boxes.
 
     Args:
-        spec: the world to extend.
         rng: draws sizes and places.
         bare: leave out the pack ahead and the lamps, for the one to work on.
     """
@@ -266,7 +265,6 @@ def _pack(body: mujoco.MjsBody, at: tuple[float, float], across: bool = False) -
     """Add a battery pack of 1.2 x 2.0 m on its stand; `at` is the middle of the edge next to the robot.
 
     Args:
-        body: what it belongs to.
         at: x, y [m].
         across: the robot comes along y instead of x.
     """

@@ -33,7 +33,6 @@ def add_hall(spec: mujoco.MjSpec, half: float = 6.0, *, marks: bool = True, stan
     """Add the floor (collides), walls and sky (seen only) and the lamps.
 
     Args:
-        spec: the world to extend.
         half: half side of the hall [m].
         marks: paint the yellow lines of the work place ahead of the robot.
         stance: middle and heading of the hall, where the robot works.

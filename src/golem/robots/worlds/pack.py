@@ -106,8 +106,6 @@ def add_pack(
     """Add pack, stand, tray and loosened screws to `spec`, which may already hold the robot.
 
     Args:
-        spec: the world to extend.
-        layout: where things stand.
         draws: the loosened screws; the other fasteners are fixed.
         sleep: let undisturbed screws sleep.
         stance: where the robot should stand before the pack: lamps and workshop are placed by it.

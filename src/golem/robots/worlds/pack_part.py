@@ -191,8 +191,6 @@ def add_clutter(spec: mujoco.MjSpec, layout: PackLayout, count: int, rng: np.ran
 
     Args:
         spec: the world, which has the body `pack`.
-        layout: where pack and tray stand.
-        count: how many.
         rng: the same state puts the same things at the same places.
     """
     pack = spec.body("pack")

@@ -36,7 +36,6 @@ def add_slope(spec: mujoco.MjSpec, angle: float) -> None:
     """Add a hall with a ramp across the way of a robot that walks ahead: up, a platform, down.
 
     Args:
-        spec: the world to extend.
         angle: inclination [rad].
     """
     add_open(spec)
@@ -56,7 +55,6 @@ def add_step(spec: mujoco.MjSpec, height: float) -> None:
     """Add a hall with a platform across the way of a robot that walks ahead: a step up, and one down.
 
     Args:
-        spec: the world to extend.
         height: of the platform [m].
     """
     add_open(spec)
@@ -70,7 +68,6 @@ def add_rubble(spec: mujoco.MjSpec, height: float, rng: np.random.Generator) -> 
     """Add a hall whose floor around the start is laid with tiles of uneven height.
 
     Args:
-        spec: the world to extend.
         height: of the highest tile [m]; every tile's is drawn evenly from 0 to it, so a step is that high at most.
         rng: draws the heights.
     """

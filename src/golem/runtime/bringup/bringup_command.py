@@ -209,9 +209,7 @@ def wrong_with(move: HandMove, wanted: int, positive: bool, names: Sequence[str]
     """Return what is wrong with what was reported of a joint that a person moved; empty if nothing is.
 
     Args:
-        move: what the robot reported.
         wanted: index of the joint that the person moved.
-        positive: whether in its positive direction.
         names: of the `NUM_JOINTS` joints.
     """
     assert len(names) == NUM_JOINTS

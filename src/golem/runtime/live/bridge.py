@@ -26,7 +26,6 @@ class RejectedMessages:
     """Messages of one kind that were refused; the first is said at once.
 
     Attributes:
-        count: how many.
         why: the reason of the last one.
     """
 
@@ -97,12 +96,8 @@ class StreamIn:
         """Subscribe.
 
         Args:
-            bus: where the values go.
-            endpoints: where they come from.
-            row: which topic.
             now: robot time [s].
             tell: says to a person what is refused.
-            take: where the values go instead.
 
         Raises:
             ValueError: the row is of no stream, not for this role, or cannot be read.
@@ -120,8 +115,6 @@ def outgoing(
     """Return what sends every stream that `endpoints` offer.
 
     Args:
-        bus: where the values are.
-        endpoints: of one role.
         encoders: for the rows that have none.
         without: topics that somebody else sends.
 
@@ -147,8 +140,6 @@ def incoming(
     """Return what reads every stream that the table gives the role of `endpoints`, by topic.
 
     Args:
-        bus: where the values go.
-        endpoints: of one role.
         now: robot time [s].
         tell: says to a person what is refused.
         takers: for values that do not simply go to the bus.

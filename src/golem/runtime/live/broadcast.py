@@ -104,8 +104,6 @@ def broadcast(
     """Yield what is to be called after every tick, so that a stack in lock-step is recorded and shown.
 
     Args:
-        running: the stack.
-        robot: its robot.
         bag: folder of the bag to write, if any.
         foxglove: port on which to serve Foxglove's protocol, if at all.
 

@@ -128,9 +128,6 @@ class DeviceProcess(ABC):
         """Publish `topics`, which are the robot's.
 
         Args:
-            participant: member of the domain.
-            node: its ROS node.
-            topics: names of the streams.
             clock: this process's own [s], in which the driver stamps.
             tell: says a line to a person.
         """

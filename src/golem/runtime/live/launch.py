@@ -134,11 +134,7 @@ def commands(config: LaunchConfig) -> dict[Part, list[str]]:
 
 
 class Process:
-    """One process, and what it prints, with its name in front.
-
-    Attributes:
-        name: which.
-    """
+    """One process, and what it prints, with its name in front."""
 
     def __init__(self, name: str, words: Sequence[str]) -> None:
         self.name = name
@@ -196,7 +192,6 @@ class Launcher:
     """The processes of one robot.
 
     Attributes:
-        processes: by name.
         gate: newest verdict of the safety gate; None before the first.
     """
 
@@ -205,7 +200,6 @@ class Launcher:
 
         Args:
             words: command line of each.
-            node: a node of the domain.
             activate: whether to open the gate once it is armed.
             damper: has the motors when the gate has died.
         """

@@ -101,10 +101,6 @@ def ask(node: RosNode, service: str, kind: str, request: Any, remedy: str) -> An
     """Call a service and return the response.
 
     Args:
-        node: who calls.
-        service: its name.
-        kind: its type.
-        request: what is sent.
         remedy: what the user can do when nobody offers it.
 
     Raises:

@@ -52,8 +52,6 @@ class RenderWorker:
 
         Args:
             stack: what `robot` was built from.
-            seed: of its episode.
-            robot: the robot.
             dds: where the images go.
         """
         self._robot = robot
@@ -142,7 +140,6 @@ def expose(
         endpoints: where the images go.
         bus: between the two.
         streams: what sends the images on `bus`.
-        name: which camera.
         t: time of the moment [s].
         save_state: the moment.
     """

@@ -27,7 +27,6 @@ def describe(endpoints: RoleEndpoints, calibration: Mapping[str, Array]) -> None
     """Publish what holds for good: the description, and every frame that does not move in its parent.
 
     Args:
-        endpoints: of the robot.
         calibration: of each camera; see `Robot.calibration`. Its optical frame in /tf_static is the claimed one.
     """
     endpoints.publish("/robot_description", String(export_urdf(hands=True)))

@@ -25,8 +25,6 @@ class RoleEndpoints:
     """The endpoints of one role; as a node of an executor it handles what has arrived, once per tick.
 
     Attributes:
-        role: whose they are.
-        node: its ROS node.
         rows: what it publishes.
     """
 
@@ -38,7 +36,6 @@ class RoleEndpoints:
         """Publish every topic of `role`, or `only` some of them.
 
         Args:
-            role: whose they are.
             participant: what the vendor's own topics are created by.
             node: what all others are created by.
             only: names of topics; None is all.
@@ -97,8 +94,6 @@ class RoleEndpoints:
         """Give the values of a topic to `take`, as the table reads them, when what has arrived is handled.
 
         Args:
-            topic: its name.
-            take: takes a value.
             refuse: told why a message is none.
 
         Raises:

@@ -103,7 +103,6 @@ class SafetyProcess:
 
     Attributes:
         commands: what to wait on between two steps.
-        status: its newest verdict.
         command: what the gate told the motors last; None before it ran.
     """
 
@@ -124,9 +123,6 @@ class SafetyProcess:
         """Guard the robot on the domain.
 
         Args:
-            participant: member of the domain.
-            node: its ROS node.
-            limits: what to enforce.
             estop: the emergency stop. None where a real one belongs: until there is one, the gate stays shut.
             clock: monotonic [s].
             who: names the owner of an endpoint by its guid.

@@ -164,8 +164,6 @@ def pursue(node: RosNode, goal: RunSkill_Goal, remedy: str, stop: threading.Even
     """Give the stack on the domain a goal, print what it says until it ends, and return the exit code.
 
     Args:
-        node: to give it through.
-        goal: the goal.
         remedy: what to do where nobody offers the action.
         stop: set by Ctrl-C: first to cancel, then to leave.
 

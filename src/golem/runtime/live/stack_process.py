@@ -157,9 +157,6 @@ class StackProcess:
         """Join the domain; the modules are built when the robot reports.
 
         Args:
-            stack: which modules.
-            participant: member of the domain.
-            node: its ROS node.
             real: whether the robot is none of ours. Nobody then calls to let a band go, the wall clock holds leg
                 controllers to their period, and joints and frames are shown by this process, since none of the
                 robot's does.

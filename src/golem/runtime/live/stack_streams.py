@@ -199,7 +199,6 @@ def encoders(
     """Return what makes the messages that take the newest state on `bus` beside their value.
 
     Args:
-        bus: of the stack.
         mode_machine: returns the machine type that the robot reports, which its commands repeat.
         joint_offset: (27,) reported minus true joint positions by calibration [rad]; None believes them.
         arms: who else may have the arms; what a program of the vendor's tells them is in reported positions.
@@ -257,7 +256,6 @@ def hand_services(bus: Bus, side: Side, now: Callable[[], float]) -> dict[str, C
 
     Args:
         bus: where its controller takes goals from.
-        side: which hand.
         now: robot time [s].
     """
 

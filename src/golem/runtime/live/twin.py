@@ -115,7 +115,6 @@ class Twin:
     """A robot on the domain.
 
     Attributes:
-        executor: its clock.
         commands: what takes the motors' command.
     """
 
@@ -132,10 +131,6 @@ class Twin:
         """Put a robot on the domain.
 
         Args:
-            stack: what it was built for.
-            robot: the robot.
-            participant: member of the domain.
-            node: its ROS node.
             render_worker: where its images are made; None renders here, which holds everything else up meanwhile.
             patience: how long its time stands still at most for a stack that is behind [s].
             tell: says a line to a person.

@@ -45,7 +45,6 @@ def cost(config: CostConfig, runs: Trajectories, stance: Stance, torque: Array) 
     """Return the (n,) costs of `runs`.
 
     Args:
-        config: weights.
         runs: n rollouts of m steps.
         stance: the reference stance.
         torque: (12,) bounds of the motor torques [N m].

@@ -54,7 +54,6 @@ class Planner:
         """Begin without a plan.
 
         Args:
-            config: options.
             horizon: time from the first to the last knot [s].
             lower: (12,) lowest targets [rad].
             upper: (12,) highest targets [rad].
