@@ -19,9 +19,8 @@ import pinocchio as pin
 
 from golem.capabilities.collision.link_poses import free_links, joint_value, link_poses
 from golem.errors import GolemError
-from golem.robots.model.geom_mesh import pose_matrix
 from golem.robots.model.link_geometry import RobotGeometry, read_geometry
-from golem.robots.model.mesh_file import package_folders
+from golem.robots.model.mesh_file import package_folders, pose_matrix
 from golem.types import Array
 
 SAME = 1e-9

@@ -134,10 +134,10 @@ def check_dds() -> list[Diagnosis]:
     """Send a sample through Cyclone DDS, and look whether the system lets it receive images; nothing without it."""
     if importlib.util.find_spec("cyclonedds") is None:
         return []
-    from golem.middleware.dds import checks, interfaces
+    from golem.middleware.dds import connect, interfaces
 
     try:
-        checks.self_test()
+        connect.self_test()
     except GolemError as error:
         return [Diagnosis("DDS", str(error), "do as that sentence says", needed=False)]
     buffer = interfaces.receive_buffer()

@@ -15,7 +15,7 @@ from golem.hardware.safety.base import SafetyLimits
 from golem.interfaces import public
 from golem.interfaces.payloads import GateState, GateStatus, Reason
 from golem.middleware.bags.base import BagMessage
-from golem.middleware.bags.catalog import topic
+from golem.middleware.bags.recorder import topic
 from golem.middleware.bags.writer import BagWriter
 from golem.middleware.wire.convert import encode_low_command, encode_low_state
 from golem.robots.model.table import JOINT_INDEX

@@ -18,8 +18,8 @@ from typing import Any, Literal
 
 from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
-from golem.middleware.ros.graph import PARTICIPANT_USER_DATA
 from golem.middleware.ros.node import RosNode
+from golem.middleware.ros.node_endpoints import PARTICIPANT_USER_DATA
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent

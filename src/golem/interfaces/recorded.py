@@ -6,7 +6,7 @@ from collections.abc import Collection
 
 from golem.interfaces import public
 from golem.middleware.bags.base import BagTopic
-from golem.middleware.bags.catalog import topic
+from golem.middleware.bags.recorder import topic
 
 COMPRESSED = "sensor_msgs/msg/CompressedImage"
 

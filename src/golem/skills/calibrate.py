@@ -15,8 +15,8 @@ from golem.capabilities.planning.base import PlanRefused
 from golem.capabilities.planning.joint_space import JointSpace, PlanningRobot
 from golem.interfaces import topics
 from golem.options import require
+from golem.robots.model.magpie_model import cuff_tags
 from golem.robots.model.spatial import transform
-from golem.robots.model.tag_cuff import cuff_tags
 from golem.robots.sensors.calibration import read_calibration
 from golem.skills.base import SkillResult, StageFailed
 from golem.skills.context import Context

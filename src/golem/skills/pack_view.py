@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from golem.capabilities.grasping.ground import height_above_ground
+from golem.capabilities.grasping.object_cloud import height_above_ground
 from golem.capabilities.navigation.edge_fit import NearEdge, near_edge, table_height
 from golem.capabilities.planning.base import PlanRefused
 from golem.interfaces import topics

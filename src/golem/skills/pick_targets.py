@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter
 
 from golem.capabilities.arms.reach_map import load_map
-from golem.capabilities.grasping.ground import height_above_ground
+from golem.capabilities.grasping.object_cloud import height_above_ground
 from golem.capabilities.perception.open_box import OpenBox, fit_open_box
 from golem.capabilities.planning.base import PlanRefused
 from golem.interfaces.payloads import Detections

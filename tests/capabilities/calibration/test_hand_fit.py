@@ -11,9 +11,8 @@ from golem.capabilities.calibration.hand_fit import OTHER, SPARE, fit_hand, hand
 from golem.capabilities.calibration.kinematic_fit import ARM, PIXEL, TagView, pose
 from golem.errors import ConfigError
 from golem.hardware.safety.base import SafetyLimits
-from golem.robots.model.magpie_model import T_HAND_CAMERA, hand_name
+from golem.robots.model.magpie_model import T_HAND_CAMERA, cuff_tags, hand_name, tag_corners
 from golem.robots.model.pinocchio_model import Kinematics
-from golem.robots.model.tag_cuff import cuff_tags, tag_corners
 from golem.robots.sensors.cameras import CAMERAS, project
 from golem.types import NUM_JOINTS, SIDES, UPPER, Array, Side
 

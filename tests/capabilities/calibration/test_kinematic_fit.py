@@ -12,10 +12,9 @@ from scipy.spatial.transform import Rotation
 from golem.capabilities.calibration.kinematic_fit import ARM, PIXEL, TagView, fit
 from golem.capabilities.calibration.view_postures import view_postures
 from golem.errors import ConfigError
-from golem.robots.model.magpie_model import hand_name
+from golem.robots.model.magpie_model import cuff_tags, hand_name, tag_corners
 from golem.robots.model.pinocchio_model import Kinematics
 from golem.robots.model.table import T_TORSO_HEAD_OPTICAL
-from golem.robots.model.tag_cuff import cuff_tags, tag_corners
 from golem.robots.sensors.cameras import HEAD, project
 from golem.types import NUM_JOINTS, SIDES, UPPER, Array, Side
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from golem.capabilities.calibration.tag_detector import TagDetector
-from golem.robots.model.tag_cuff import CELLS, cuff_tags
+from golem.robots.model.magpie_model import CELLS, cuff_tags
 
 
 @pytest.mark.parametrize("number", [0, 3, 7])

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from golem.capabilities.grasping.ground import MIN_POINTS, ground_plane, height_above_ground
+from golem.capabilities.grasping.object_cloud import MIN_POINTS, ground_plane, height_above_ground
 from golem.types import Array, Detection, LocalizedObject
 
 TOP = np.array([0.43, -0.14, -0.03])

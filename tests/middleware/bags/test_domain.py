@@ -16,10 +16,9 @@ pytest.importorskip("rosbags")
 from golem.errors import ConfigError
 from golem.interfaces.recorded import public_topics
 from golem.middleware.bags.base import BagMessage, BagTopic
-from golem.middleware.bags.catalog import offered, topic
 from golem.middleware.bags.player import PlayConfig, Player
 from golem.middleware.bags.reader import Bag
-from golem.middleware.bags.recorder import GONE, HOLD, MANY, Recorder, clock_time
+from golem.middleware.bags.recorder import GONE, HOLD, MANY, Recorder, clock_time, offered, topic
 from golem.middleware.bags.writer import BagWriter
 from golem.middleware.dds.base import DEFAULT, LATCHED, Participant, Qos, Reader
 from golem.middleware.dds.local import LocalDomain

@@ -20,9 +20,9 @@ pytest.importorskip("cyclonedds")
 from tests.middleware.dds.test_contract import TYPE, eventually, texts
 
 from golem.errors import ConfigError, MissingExtra
-from golem.middleware.dds import checks, discovery, domain, endpoints, library
+from golem.middleware.dds import discovery, domain, endpoints, library
 from golem.middleware.dds.base import ENCAPSULATION, DdsError, Qos, Sample
-from golem.middleware.dds.connect import connect
+from golem.middleware.dds.connect import connect, self_test
 from golem.middleware.dds.domain import DdsConfig, configuration
 from golem.middleware.dds.interfaces import Interface, find_interface, interfaces
 from golem.middleware.dds.participant import CycloneParticipant
@@ -170,15 +170,15 @@ def test_discovery_tells_who_is_there(participant: CycloneParticipant, domain: i
 
 
 def test_the_self_test_sees_structs_of_another_layout(monkeypatch: pytest.MonkeyPatch) -> None:
-    checks.self_test.cache_clear()
+    self_test.cache_clear()
 
     shifted = struct.Struct("@III?xxxxxxxxqQQ5I4x")
     monkeypatch.setattr(endpoints, "_INFO", shifted)
     monkeypatch.setattr(endpoints, "SampleInfo", ctypes.c_ubyte * shifted.size)
     with pytest.raises(DdsError, match="does not give back what it was sent"):
-        checks.self_test()
+        self_test()
     monkeypatch.undo()
-    checks.self_test()
+    self_test()
 
 
 def test_another_series_of_cyclone_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -195,7 +195,7 @@ def test_another_series_of_cyclone_is_refused(monkeypatch: pytest.MonkeyPatch) -
 STALLED = """
 import sys
 from golem.middleware.dds.base import Qos
-from golem.middleware.dds.connect import connect
+from golem.middleware.dds.connect import connect, self_test
 from golem.middleware.dds.domain import DdsConfig
 reader = connect(DdsConfig(int(sys.argv[1]))).reader("rt/a", sys.argv[2], Qos(depth=1))
 sys.stdin.read()
@@ -223,7 +223,7 @@ def test_a_stalled_reader_costs_samples_but_neither_an_error_nor_the_loop(
 OTHER = """
 import sys, time
 from golem.middleware.dds.base import Qos
-from golem.middleware.dds.connect import connect
+from golem.middleware.dds.connect import connect, self_test
 from golem.middleware.dds.domain import DdsConfig
 participant = connect(DdsConfig(int(sys.argv[1])))
 writer = participant.writer("rt/a", sys.argv[2], Qos(depth=None))

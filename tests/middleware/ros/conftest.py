@@ -10,8 +10,8 @@ import pytest
 
 from golem.middleware.dds.base import Participant
 from golem.middleware.dds.local import LocalDomain
-from golem.middleware.ros.graph import PARTICIPANT_USER_DATA
 from golem.middleware.ros.node import RosNode
+from golem.middleware.ros.node_endpoints import PARTICIPANT_USER_DATA
 
 PICK = "golem_interfaces/action/Pick"
 SET_BOOL = "std_srvs/srv/SetBool"

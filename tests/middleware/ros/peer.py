@@ -11,9 +11,9 @@ from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.ros.action_server import ServerGoal
 from golem.middleware.ros.codec import action, service
 from golem.middleware.ros.goals import GoalStatus
-from golem.middleware.ros.graph import PARTICIPANT_USER_DATA
 from golem.middleware.ros.msgs.golem_interfaces import SkillFeedback, SkillResult
 from golem.middleware.ros.node import RosNode
+from golem.middleware.ros.node_endpoints import PARTICIPANT_USER_DATA
 
 PICK, SET_BOOL = "golem_interfaces/action/Pick", "std_srvs/srv/SetBool"
 STAGES = ("detect", "approach", "grasp", "pull")

@@ -15,8 +15,8 @@ from golem.errors import ConfigError
 from golem.middleware.dds.base import LATCHED, Participant, Sample
 from golem.middleware.dds.local import LocalDomain
 from golem.middleware.ros.codec import dds_name, type_hash
-from golem.middleware.ros.graph import INFO, PARTICIPANT_USER_DATA
 from golem.middleware.ros.node import SERVICES, RosNode
+from golem.middleware.ros.node_endpoints import INFO, PARTICIPANT_USER_DATA
 
 from .conftest import PICK, SET_BOOL, STRING
 

@@ -15,8 +15,8 @@ from golem.middleware.ros.action_client import ActionClient
 from golem.middleware.ros.codec import action, service
 from golem.middleware.ros.future import RosError
 from golem.middleware.ros.goals import CancelCode, GoalStatus
-from golem.middleware.ros.graph import PARTICIPANT_USER_DATA
 from golem.middleware.ros.node import RosNode
+from golem.middleware.ros.node_endpoints import PARTICIPANT_USER_DATA
 
 from .conftest import PICK, SET_BOOL
 

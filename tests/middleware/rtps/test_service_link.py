@@ -17,9 +17,9 @@ pytest.importorskip("rosbags")
 from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.ros import codec
-from golem.middleware.ros.graph import PARTICIPANT_USER_DATA
 from golem.middleware.ros.msgs.std_srvs import SetBool_Request, SetBool_Response
 from golem.middleware.ros.node import RosNode
+from golem.middleware.ros.node_endpoints import PARTICIPANT_USER_DATA
 from golem.middleware.rtps import announcements, submessages
 from golem.middleware.rtps.announcements import SPDP_READER, SPDP_WRITER, WRITERS_READER, WRITERS_WRITER
 from golem.middleware.rtps.service_link import GROUP

@@ -14,7 +14,7 @@ from golem.robots.base import Robot
 from golem.robots.model.table import JOINT_NAMES, load_limits
 from golem.robots.mujoco import engine
 from golem.robots.mujoco.engine import MujocoConfig, MujocoRobot
-from golem.robots.mujoco.hoist import HoistConfig
+from golem.robots.mujoco.external_forces import HoistConfig
 from golem.robots.mujoco.scene import COARSE_STEP, FINE_STEP
 from golem.robots.sensors.profiles import RealismProfile, load_profile
 from golem.runtime.lockstep import start_posture

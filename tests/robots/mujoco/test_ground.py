@@ -15,7 +15,7 @@ from golem.robots.base import HasGantry
 from golem.robots.model.export import export_mjcf
 from golem.robots.mujoco.config import MujocoConfig
 from golem.robots.mujoco.engine import MujocoRobot
-from golem.robots.mujoco.hoist import RELEASE_TIME
+from golem.robots.mujoco.external_forces import RELEASE_TIME
 from golem.runtime.lockstep import start_posture
 from golem.types import NUM_JOINTS, LowCommand
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from golem.robots.model.mjcf import robot_spec
-from golem.robots.mujoco.hoist import Hoist, HoistConfig
+from golem.robots.mujoco.external_forces import Hoist, HoistConfig
 from golem.types import Array
 
 NO_SWAY = np.zeros(2)

@@ -11,7 +11,7 @@ from golem.errors import ConfigError
 from golem.options import fill
 from golem.robots.mujoco.config import MujocoConfig
 from golem.robots.mujoco.engine import MujocoRobot
-from golem.robots.mujoco.hoist import RELEASE_TIME
+from golem.robots.mujoco.external_forces import RELEASE_TIME
 from golem.runtime.lockstep import start_posture
 from golem.types import NUM_JOINTS, TICK, Array, HandCommand, LowCommand
 

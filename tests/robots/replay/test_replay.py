@@ -21,8 +21,8 @@ from golem.interfaces import ros_convert as convert
 from golem.interfaces.payloads import Detections, Exposure
 from golem.interfaces.public import CAMERA_INFO, COLOR, DEPTH, gripper, image, optical_frame
 from golem.middleware.bags.base import BagError, BagMessage, BagTopic
-from golem.middleware.bags.catalog import topic
 from golem.middleware.bags.reader import Bag
+from golem.middleware.bags.recorder import topic
 from golem.middleware.bags.writer import BagWriter
 from golem.middleware.bus import News
 from golem.middleware.dds.base import LATCHED, SENSOR, Payload

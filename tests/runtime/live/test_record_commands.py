@@ -11,7 +11,7 @@ pytest.importorskip("mcap")
 pytest.importorskip("rosbags")
 
 from golem.middleware.bags.base import BagMessage
-from golem.middleware.bags.catalog import topic
+from golem.middleware.bags.recorder import topic
 from golem.middleware.bags.writer import BagConfig, BagWriter
 from golem.runtime.live import record_commands
 from golem.runtime.live.record_commands import Growth

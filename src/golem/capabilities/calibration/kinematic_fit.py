@@ -18,10 +18,9 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from golem.errors import ConfigError
-from golem.robots.model.magpie_model import hand_name
+from golem.robots.model.magpie_model import cuff_tags, hand_name, tag_corners
 from golem.robots.model.pinocchio_model import Kinematics
 from golem.robots.model.table import T_TORSO_HEAD_OPTICAL
-from golem.robots.model.tag_cuff import cuff_tags, tag_corners
 from golem.robots.sensors.calibration import Calibration
 from golem.robots.sensors.cameras import HEAD, project
 from golem.types import NUM_JOINTS, SIDES, Array, CameraInfo, Side

@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 
 from golem.capabilities.arms.postures import posture
 from golem.capabilities.calibration.kinematic_fit import information
-from golem.robots.model.magpie_model import T_HAND_GRIPPER, T_WRIST_HAND
+from golem.robots.model.magpie_model import T_HAND_GRIPPER, T_WRIST_HAND, cuff_tags
 from golem.robots.model.pinocchio_model import Kinematics
 from golem.robots.model.table import JOINTS, T_TORSO_HEAD_OPTICAL
-from golem.robots.model.tag_cuff import cuff_tags
 from golem.robots.sensors.cameras import HEAD, project
 from golem.types import NUM_JOINTS, UPPER, Array, CameraInfo, Side
 

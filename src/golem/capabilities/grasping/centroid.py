@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from golem.capabilities.grasping.base import Grasp, Gripper, OpenLoop
-from golem.capabilities.grasping.ground import height_above_ground
+from golem.capabilities.grasping.object_cloud import height_above_ground
 from golem.finite import check_finite
 from golem.types import Array, LocalizedObject
 

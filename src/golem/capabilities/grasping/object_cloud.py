@@ -1,4 +1,7 @@
-"""Which points of a sighting are the object: without the plane it stands on or hangs before, and in one piece."""
+"""Which points of a sighting are the object: without the plane it stands on or hangs before, and in one piece.
+
+Which way the ground faces around it, and how high it stands on that.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import KDTree
 
-from golem.types import Array
+from golem.types import Array, LocalizedObject
 
 PLANE = 0.004
 """Points this near to a plane are on it [m]: depth noise at arm's length."""
@@ -161,3 +164,49 @@ def normals_of(points: Array, neighbours: int = 16) -> tuple[Array, NDArray[np.b
     off = near - near.mean(axis=1, keepdims=True)
     values, vectors = np.linalg.eigh(np.einsum("nki,nkj->nij", off, off))
     return vectors[:, :, 0], values[:, 0] < 0.3 * values[:, 1]
+
+
+STANDS_PROUD = 0.004
+"""What is less than this below the object's top is the object [m]."""
+THICKNESS = 0.004
+"""Points further than this from the first plane are not ground [m]."""
+MIN_GROUND = 60
+"""Fewer points give no plane."""
+STEEPEST = 0.35
+"""A plane steeper than this against the vertical is not the ground the object stands on [rad]."""
+
+
+def height_above_ground(sighting: LocalizedObject) -> float | None:
+    """Return how high the object's top is above the lowest tenth of its cloud [m]; None without a cloud."""
+    if len(sighting.points) == 0:
+        return None
+    return float(sighting.position[2]) - float(np.quantile(sighting.points[:, 2], 0.1))
+
+
+def ground_plane(sighting: LocalizedObject) -> tuple[Array, float] | None:
+    """Return the ground around the object and how high its top is above it; None where it cannot be told.
+
+    A least-squares plane z = a x + b y + c through the points below the object's top, fitted twice: the second time
+    without what lies off the first plane.
+
+    Returns:
+        the (3,) unit normal of the plane, upwards, and the height of the object's top above it [m].
+    """
+    points = sighting.points[sighting.points[:, 2] < sighting.position[2] - STANDS_PROUD]
+    normal, height = None, 0.0
+    for _ in range(2):
+        if len(points) < MIN_GROUND:
+            return None
+        middle = points.mean(axis=0)
+        d = points - middle
+        xx, xy, yy = d[:, 0] @ d[:, 0], d[:, 0] @ d[:, 1], d[:, 1] @ d[:, 1]
+        xz, yz = d[:, 0] @ d[:, 2], d[:, 1] @ d[:, 2]
+        determinant = xx * yy - xy * xy
+        if determinant < 1e-4 * (xx + yy) ** 2:
+            return None
+        a = (xz * yy - yz * xy) / determinant
+        b = (yz * xx - xz * xy) / determinant
+        points = points[np.abs(d[:, 2] - a * d[:, 0] - b * d[:, 1]) < THICKNESS]
+        normal = np.array([-a, -b, 1.0]) / np.sqrt(a * a + b * b + 1.0)
+        height = float((sighting.position - middle) @ normal)
+    return (normal, height) if normal is not None and np.arccos(normal[2]) < STEEPEST else None

@@ -15,7 +15,7 @@ import numpy as np
 
 from golem.capabilities.grasping.base import Grasp, Gripper, ServoLaw, ServoStatus, ServoStep
 from golem.capabilities.grasping.centroid import UP, Centroid, CentroidConfig, grasp_depth, grasp_pose
-from golem.capabilities.grasping.ground import ground_plane
+from golem.capabilities.grasping.object_cloud import ground_plane
 from golem.types import Array, LocalizedObject
 
 

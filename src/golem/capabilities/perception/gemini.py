@@ -14,7 +14,6 @@ from typing import Any, cast
 
 import numpy as np
 
-from golem.capabilities.perception.boxes import Box, lift_boxes
 from golem.capabilities.perception.gemini_service import (
     GeminiService,
     GeminiServiceConfig,
@@ -22,7 +21,7 @@ from golem.capabilities.perception.gemini_service import (
     read_json,
     to_jpeg,
 )
-from golem.capabilities.perception.lift import LiftConfig
+from golem.capabilities.perception.lift import Box, LiftConfig, lift_boxes
 from golem.types import LocalizedObject, RgbdImage
 
 SCALE = 1000.0

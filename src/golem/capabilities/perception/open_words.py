@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from golem.capabilities.perception.boxes import Box, lift_boxes
-from golem.capabilities.perception.lift import LiftConfig, unproject
+from golem.capabilities.perception.lift import Box, LiftConfig, lift_boxes, unproject
 from golem.capabilities.perception.yolo_world import distinct
 from golem.errors import ConfigError, MissingExtra
 from golem.options import require

@@ -17,8 +17,7 @@ import numpy as np
 import onnxruntime
 from numpy.typing import NDArray
 
-from golem.capabilities.perception.boxes import Box, lift_boxes
-from golem.capabilities.perception.lift import LiftConfig
+from golem.capabilities.perception.lift import Box, LiftConfig, lift_boxes
 from golem.errors import ConfigError, unknown_name
 from golem.options import require
 from golem.types import Array, LocalizedObject, RgbdImage

@@ -20,7 +20,7 @@ from golem.evaluation.episodes.episode import legs_stack
 from golem.interfaces import lidar_convert, public
 from golem.interfaces.lidar import ExternalOdometry, LegOdometry, LidarImu, LidarScan
 from golem.middleware.bags.base import BagMessage
-from golem.middleware.bags.catalog import topic
+from golem.middleware.bags.recorder import topic
 from golem.middleware.bags.writer import BagConfig, BagWriter
 from golem.middleware.ros import codec
 from golem.provenance import stack_facts

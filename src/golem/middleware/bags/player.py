@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 from golem.errors import ConfigError, unknown_name
 from golem.middleware.bags.base import BagError, BagMessage, BagTopic
-from golem.middleware.bags.catalog import topic as describe
 from golem.middleware.bags.reader import Bag
 from golem.middleware.bags.recorder import CLOCK, CLOCK_KIND
+from golem.middleware.bags.recorder import topic as describe
 from golem.middleware.dds.base import ENCAPSULATION, DdsError, Participant, Payload, Qos, Writer
 from golem.middleware.ros import codec, names
 from golem.middleware.ros.message import NANO

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import re
 import struct
 import threading
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from golem.middleware.bags.base import BagMessage, BagTopic, Sink
-from golem.middleware.dds.base import Participant, Payload, Qos, Reader, Sample
-from golem.middleware.ros import names
+from golem.middleware.dds.base import DEFAULT, Participant, Payload, Qos, Reader, Sample
+from golem.middleware.ros import codec, names
 from golem.middleware.ros.codec import dds_name
 from golem.middleware.ros.message import NANO
+
+if TYPE_CHECKING:
+    from golem.middleware.dds.discovery import Endpoint
 
 CLOCK, CLOCK_KIND = "/clock", "rosgraph_msgs/msg/Clock"
 PERIOD = 0.05
@@ -190,3 +195,31 @@ def _take_all(reader: Reader, maximum: int) -> list[Sample]:
             break
         out += samples
     return [sample for sample in out if sample.alive]
+
+
+def topic(name: str, kind: str, qos: Qos = DEFAULT) -> BagTopic:
+    """Return the topic called `name` of messages of type `kind`, whose writers offer `qos`.
+
+    Raises:
+        ConfigError: there is no such type.
+        MissingExtra: rosbags, which knows the types, is not installed.
+    """
+    return BagTopic(name, kind, codec.definition(kind), qos, codec.type_hash(kind))
+
+
+def offered(writers: Iterable[Endpoint]) -> list[BagTopic]:
+    """Return the topics of `writers` that ROS could read and whose types are known here."""
+    known = set(codec.codec().names())
+    found: dict[str, BagTopic] = {}
+    for writer in writers:
+        sort, name = names.from_wire(writer.topic)
+        kind = _kind(writer.type_name)
+        if sort == "topic" and kind in known and name not in found:
+            found[name] = topic(name, kind, writer.qos)
+    return list(found.values())
+
+
+def _kind(type_name: str) -> str:
+    """Return the ROS name of a type from that on the wire, `sensor_msgs::msg::dds_::Image_`; empty if it has none."""
+    match = re.fullmatch(r"(\w+)::(\w+)::dds_::(\w+)_", type_name)
+    return "/".join(match.groups()) if match else ""

@@ -10,8 +10,7 @@ from typing import Any
 
 from golem.middleware.dds.base import Qos
 from golem.middleware.dds.library import Cyclone, EndpointData, ParticipantData, SampleInfo
-from golem.middleware.dds.participant import CycloneParticipant
-from golem.middleware.dds.qos import read_property, read_qos, read_user_data
+from golem.middleware.dds.participant import CycloneParticipant, read_property, read_qos, read_user_data
 
 _PSEUDO = 0x7FFF0000
 """DDS_MIN_PSEUDO_HANDLE: built-in topics are counted from here."""

@@ -26,9 +26,8 @@ from golem.middleware.ros.action_server import RESULT_TIMEOUT, ActionHandler, Ac
 from golem.middleware.ros.callback_guard import CallbackGuard, log_error
 from golem.middleware.ros.codec import DEFAULT_DISTRO
 from golem.middleware.ros.future import Future
-from golem.middleware.ros.graph import DiscoveryInfo
 from golem.middleware.ros.msgs import rcl_interfaces as rcl
-from golem.middleware.ros.node_endpoints import NodeEndpoints
+from golem.middleware.ros.node_endpoints import DiscoveryInfo, NodeEndpoints
 from golem.middleware.ros.pubsub import Publisher, Subscription
 from golem.middleware.ros.service import Client, Service
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from golem.errors import ConfigError, unknown_name
 from golem.robots.model import mjcf
-from golem.robots.model.geom_mesh import geom_mesh, pose_matrix
+from golem.robots.model.mesh_file import geom_mesh, pose_matrix
 from golem.types import Array
 
 GeometryChoice = Literal["visual", "collision"]

@@ -16,7 +16,6 @@ from scipy.spatial.transform import Rotation
 from tqdm import tqdm
 
 from golem.errors import ConfigError
-from golem.robots.model.geom_mesh import primitive
 from golem.robots.model.link_geometry import (
     GeometryChoice,
     JointKind,
@@ -26,7 +25,7 @@ from golem.robots.model.link_geometry import (
     led,
     with_surface,
 )
-from golem.robots.model.mesh_file import find_mesh, read_mesh
+from golem.robots.model.mesh_file import find_mesh, primitive, read_mesh
 from golem.robots.model.spatial import rotation_rpy, transform
 from golem.types import Array
 

@@ -9,7 +9,7 @@ from typing import Literal
 
 from golem.errors import ConfigError
 from golem.robots.model.contact_shapes import FOOT_FRICTION, Feet
-from golem.robots.mujoco.hoist import HoistConfig
+from golem.robots.mujoco.external_forces import HoistConfig
 from golem.robots.worlds.conditions import LayoutKind, check_condition
 from golem.robots.worlds.robocasa import RobocasaConfig
 

@@ -18,9 +18,8 @@ from golem.robots.model.table import BASE_LINK, load_limits
 from golem.robots.mujoco import twin_stages
 from golem.robots.mujoco.camera import CameraRig
 from golem.robots.mujoco.config import WORKSHOPS, MujocoConfig
-from golem.robots.mujoco.external_forces import Pushes
+from golem.robots.mujoco.external_forces import Hoist, Pushes
 from golem.robots.mujoco.hand_servos import HandServos
-from golem.robots.mujoco.hoist import Hoist
 from golem.robots.mujoco.lidar_sensor import LidarMoment, LidarSensor
 from golem.robots.mujoco.motors import Motors
 from golem.robots.mujoco.scene import COARSE_STEP, FINE_STEP, Scene, build_scene, nominal_layout

@@ -12,9 +12,9 @@ import numpy as np
 from golem.errors import ConfigError
 from golem.robots.model import contact_shapes, magpie_model, mjcf
 from golem.robots.model.looks import VISUAL_GROUP
+from golem.robots.model.magpie_model import CELLS, PLATE, TAG_SIZE, cuff_tags
 from golem.robots.model.spatial import quat_of
 from golem.robots.model.table import BASE_LINK, JOINT_NAMES
-from golem.robots.model.tag_cuff import CELLS, PLATE, TAG_SIZE, cuff_tags
 from golem.robots.mujoco.config import IONIQ5, KITCHENS, PLANTS, WITH_PACK, WORKSHOPS, MujocoConfig
 from golem.robots.sensors.profiles import RealismProfile
 from golem.robots.sensors.streams import stream

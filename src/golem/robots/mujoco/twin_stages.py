@@ -29,9 +29,8 @@ from golem.native import (
     words,
 )
 from golem.robots.model.imu_mount import TORSO, torso_motion
-from golem.robots.mujoco.external_forces import PUSHES, apply_pushes, clear_pushes
+from golem.robots.mujoco.external_forces import HOIST, PUSHES, apply_pushes, clear_pushes, pull
 from golem.robots.mujoco.hand_servos import HAND, drive_hand, move_reference, read_hand
-from golem.robots.mujoco.hoist import HOIST, pull
 from golem.robots.mujoco.motors import MOTORS, drive, give, report
 from golem.robots.mujoco.scene import COARSE_STEP, FINE_STEP
 from golem.robots.sensors.imu import BLOCK, IMU, measure_imu

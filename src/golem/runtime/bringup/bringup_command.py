@@ -27,10 +27,9 @@ from golem.runtime.bringup.base import (
     Task,
     Workbench,
 )
-from golem.runtime.bringup.listening_checks import check_domain, check_state
+from golem.runtime.bringup.listening_checks import check_domain, check_sensors, check_state
 from golem.runtime.bringup.motor_checks import check_estop, check_hoist, check_motion, check_release
 from golem.runtime.bringup.robot_link import RobotLink
-from golem.runtime.bringup.sensor_checks import check_sensors
 from golem.runtime.live.launch import Process
 from golem.runtime.live.node_setup import log_line, member
 from golem.types import NUM_JOINTS, Array, LowState

@@ -17,7 +17,7 @@ from golem.interfaces import public
 from golem.interfaces.payloads import GateStatus
 from golem.interfaces.ros_convert import gate_status
 from golem.middleware.bags.base import BagMessage
-from golem.middleware.bags.catalog import topic
+from golem.middleware.bags.recorder import topic
 from golem.middleware.bags.writer import BagWriter
 from golem.middleware.dds.base import Payload
 from golem.middleware.ros import codec

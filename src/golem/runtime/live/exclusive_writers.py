@@ -10,7 +10,7 @@ from golem.middleware.dds import discovery
 from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.dds.participant import CycloneParticipant
 from golem.middleware.ros import names
-from golem.middleware.ros.graph import PARTICIPANT_USER_DATA
+from golem.middleware.ros.node_endpoints import PARTICIPANT_USER_DATA
 
 DISCOVERY = 0.3
 """Time that whoever is on the domain already gets to be seen [s]."""

@@ -14,10 +14,9 @@ from tyro.conf import OmitArgPrefixes, Positional
 
 from golem.errors import ConfigError
 from golem.interfaces.recorded import public_topics
-from golem.middleware.bags.catalog import offered
 from golem.middleware.bags.player import PlayConfig, Player
 from golem.middleware.bags.reader import Bag, repair, told
-from golem.middleware.bags.recorder import Recorder
+from golem.middleware.bags.recorder import Recorder, offered
 from golem.middleware.bags.writer import BagConfig, BagWriter, Compression
 from golem.middleware.dds import discovery
 from golem.middleware.dds.connect import connect
