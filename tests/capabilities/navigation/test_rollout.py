@@ -7,7 +7,7 @@ import pytest
 
 from golem.capabilities.navigation.astar import Way
 from golem.capabilities.navigation.footprint import HOME
-from golem.capabilities.navigation.local_controller import LocalController, LocalControllerConfig
+from golem.capabilities.navigation.local_controller import Around, LocalController, LocalControllerConfig
 from golem.types import Array, PlanarPose, Twist
 
 HERE = PlanarPose(0.0, 0.0, 0.0)
@@ -33,14 +33,14 @@ def walking(x: float, y: float, vx: float, vy: float) -> Array:
     ],
 )
 def test_a_twist_is_tried_against_where_people_are_by_then(person: Array, free: bool) -> None:
-    assert LOCAL.clear(AHEAD, HERE, HOME, OPEN, FRAME, person) is free
+    assert LOCAL.clear(AHEAD, HERE, HOME, Around(OPEN, FRAME, person)) is free
 
 
 def test_it_stands_for_nobody_who_walks_elsewhere_and_evades_who_comes() -> None:
     way, goal = Way(np.linspace((0.0, 0.0), (3.0, 0.0), 60)), PlanarPose(3.0, 0.0, 0.0)
-    aside = LOCAL.follow(HERE, way, goal, HOME, OPEN, FRAME, walking(2.0, 2.0, 0.0, 1.0))
-    assert aside == LOCAL.follow(HERE, way, goal, HOME, OPEN, FRAME)
-    evaded = LOCAL.follow(HERE, way, goal, HOME, OPEN, FRAME, walking(1.7, 0.1, -1.2, 0.0))
+    aside = LOCAL.follow(HERE, way, goal, HOME, Around(OPEN, FRAME, walking(2.0, 2.0, 0.0, 1.0)))
+    assert aside == LOCAL.follow(HERE, way, goal, HOME, Around(OPEN, FRAME))
+    evaded = LOCAL.follow(HERE, way, goal, HOME, Around(OPEN, FRAME, walking(1.7, 0.1, -1.2, 0.0)))
     assert evaded is not None and evaded.vx <= 0.0 and evaded.vy < 0.0
 
 
@@ -49,5 +49,5 @@ def test_it_evades_into_no_obstacle() -> None:
     walled = np.full((80, 80), 0.02)  # whatever it does, something comes nearer than its margin
     walled[35:46, 35:50] = 0.07
     coming = walking(1.7, 0.0, -1.2, 0.0)
-    twist = LOCAL.follow(HERE, way, goal, HOME, walled, FRAME, coming)
-    assert twist is None or LOCAL.clear(twist, HERE, HOME, walled, FRAME)
+    twist = LOCAL.follow(HERE, way, goal, HOME, Around(walled, FRAME, coming))
+    assert twist is None or LOCAL.clear(twist, HERE, HOME, Around(walled, FRAME))

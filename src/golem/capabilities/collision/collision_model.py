@@ -80,7 +80,7 @@ class CollisionModel:
             return True
         if world is None:
             return False
-        return world_kernel.world_collides(q, self.ints, self.floats, *world.arrays(), margin)
+        return world_kernel.world_collides(q, self.ints, self.floats, world.tables, margin)
 
     def collides_each(self, Q: Array, margin: float = 0.0, world: World | None = None) -> NDArray[np.bool_]:
         """Return (m,) whether each row of `Q` (m, n) collides, see `collides`."""
@@ -90,7 +90,7 @@ class CollisionModel:
         if world is not None:
             free = np.flatnonzero(~out)
             hit = np.empty(len(free), np.bool_)
-            world_kernel.world_collides_each(Q[free], self.ints, self.floats, *world.arrays(), margin, hit)
+            world_kernel.world_collides_each(Q[free], self.ints, self.floats, world.tables, margin, hit)
             out[free] = hit
         return out
 
@@ -102,7 +102,7 @@ class CollisionModel:
         distance, gradient = np.empty(most), np.empty((most, len(self.joints)))
         spheres = np.empty(most, np.int64)
         count = world_kernel.nearest_world(
-            q, self.ints, self.floats, self._moving, self.sphere_body, self.sphere_link, *world.arrays(),
+            q, self.ints, self.floats, self._moving, self.sphere_body, self.sphere_link, world.tables,
             cutoff, distance, gradient, spheres,
         )  # fmt: skip
         order = np.argsort(distance[:count], kind="stable")

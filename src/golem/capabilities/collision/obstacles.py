@@ -10,7 +10,7 @@ import numpy as np
 from scipy import ndimage
 
 from golem.capabilities.collision import world_kernel
-from golem.capabilities.collision.world_kernel import Cells, Points
+from golem.capabilities.collision.world_kernel import Cells, Points, WorldTables
 from golem.errors import ConfigError, unknown_name
 from golem.types import Array
 
@@ -186,7 +186,8 @@ class World:
             row[1:10] = obstacle.T_base_obstacle[:3, :3].ravel()
             row[10:13] = obstacle.T_base_obstacle[:3, 3]
             row[13 : 13 + len(obstacle.size)] = obstacle.size
-        self._cloud = cloud or _NO_CLOUD
+        c = cloud or _NO_CLOUD
+        self.tables = WorldTables(self.shapes, c.balls, c.cells, c.steps, c.frame)
 
     def distance(self, balls: Array, cutoff: float = 0.2) -> tuple[Array, Array]:
         """Return how near balls are to the nearest solid.
@@ -200,17 +201,9 @@ class World:
             in which it grows fastest, zero where nothing is near.
         """
         distance, direction = np.empty(len(balls)), np.empty((len(balls), 3))
-        c = self._cloud
-        world_kernel.ball_distances(
-            np.ascontiguousarray(balls, float), self.shapes, c.balls, c.cells, c.steps, c.frame, cutoff,
-            distance, direction,
-        )  # fmt: skip
+        balls = np.ascontiguousarray(balls, float)
+        world_kernel.ball_distances(balls, self.tables, cutoff, distance, direction)
         return distance, direction
-
-    def arrays(self) -> tuple[Array, Array, Cells, Cells, Array]:
-        """Return shapes, balls, cells, steps and frame as `world_kernel` reads them."""
-        c = self._cloud
-        return self.shapes, c.balls, c.cells, c.steps, c.frame
 
 
 _NO_CLOUD = CloudGrid(

@@ -6,6 +6,7 @@ A shape is a row of 16: kind, rotation (9) and position (3) of its frame in the 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,24 @@ Cells = NDArray[np.int32]
 Points = NDArray[np.float64] | NDArray[np.float32]
 
 _BOX, _CYLINDER, _SPHERE = 0, 1, 2
+
+
+class WorldTables(NamedTuple):
+    """A world as the kernels read it.
+
+    Attributes:
+        shapes: (n, 16), see above.
+        balls: (k, 4) mean and reach of the points in each occupied cell of the cloud [m].
+        cells: number of each cell's ball, -1 where it is empty.
+        steps: how many cells away the nearest occupied one is.
+        frame: (4,) corner of the grid and side of a cell [m].
+    """
+
+    shapes: Array
+    balls: Array
+    cells: Cells
+    steps: Cells
+    frame: Array
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -131,10 +150,9 @@ def _to_shape(x: float, y: float, z: float, shapes: Array, i: int, out: Array) -
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _to_cloud(
-    x: float, y: float, z: float, reach: float, balls: Array, cells: Cells, steps: Cells, frame: Array, out: Array
-) -> float:
+def _to_cloud(x: float, y: float, z: float, reach: float, world: WorldTables, out: Array) -> float:
     """Return the distance of a point from the nearest ball of a cloud, or `reach` if none is nearer."""
+    balls, cells, steps, frame = world.balls, world.cells, world.steps, world.frame
     size, h = cells.shape, frame[3]
     # The block of cells to look at, and the nearest cell of the grid: a point may be outside of it.
     low, high, near = np.empty(3, np.int64), np.empty(3, np.int64), np.empty(3, np.int64)
@@ -171,26 +189,16 @@ def _to_cloud(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _to_world(
-    placed: Array,
-    row: int,
-    shapes: Array,
-    balls: Array,
-    cells: Cells,
-    steps: Cells,
-    frame: Array,
-    cutoff: float,
-    out: Array,
-) -> float:
+def _to_world(placed: Array, row: int, world: WorldTables, cutoff: float, out: Array) -> float:
     """Return the distance of ball `row` of `placed` from the world, or `cutoff`; write the direction of its growth."""
     best, found = cutoff, np.zeros(3)
     x, y, z, r = placed[row, 0], placed[row, 1], placed[row, 2], placed[row, 3]
     out[0] = out[1] = out[2] = 0.0
-    for i in range(len(shapes) + (len(balls) > 0)):
-        if i < len(shapes):
-            d = _to_shape(x, y, z, shapes, i, found) - r
+    for i in range(len(world.shapes) + (len(world.balls) > 0)):
+        if i < len(world.shapes):
+            d = _to_shape(x, y, z, world.shapes, i, found) - r
         else:
-            d = _to_cloud(x, y, z, best + r, balls, cells, steps, frame, found) - r
+            d = _to_cloud(x, y, z, best + r, world, found) - r
         if d < best:
             best = d
             for k in range(3):
@@ -199,38 +207,17 @@ def _to_world(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def ball_distances(
-    placed: Array,
-    shapes: Array,
-    balls: Array,
-    cells: Cells,
-    steps: Cells,
-    frame: Array,
-    cutoff: float,
-    distance: Array,
-    direction: Array,
-) -> None:
+def ball_distances(placed: Array, world: WorldTables, cutoff: float, distance: Array, direction: Array) -> None:
     """Write distance (n,) and direction (n, 3) of balls (n, 4), see `World.distance`."""
     out = np.empty(3)
     for i in range(len(placed)):
-        distance[i] = _to_world(placed, i, shapes, balls, cells, steps, frame, cutoff, out)
+        distance[i] = _to_world(placed, i, world, cutoff, out)
         for k in range(3):
             direction[i, k] = out[k]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def bodies_hit_world(
-    R: Array,
-    p: Array,
-    ints: Ints,
-    floats: Array,
-    shapes: Array,
-    balls: Array,
-    cells: Cells,
-    steps: Cells,
-    frame: Array,
-    margin: float,
-) -> bool:
+def bodies_hit_world(R: Array, p: Array, ints: Ints, floats: Array, world: WorldTables, margin: float) -> bool:
     """Return whether a moving sphere comes as near as `margin` [m] to the world, the bodies being where they are put.
 
     A cluster's ball is asked first, and its spheres only where that is near.
@@ -244,7 +231,7 @@ def bodies_hit_world(
         for i in range(ints[first] - 1, ints[first + 1]):
             around = i < ints[first]
             put(R, p, b, floats, ints[CLUSTER_BALLS] + 4 * c if around else ints[BALLS] + 4 * i, placed, 0)
-            far = _to_world(placed, 0, shapes, balls, cells, steps, frame, margin + 1e-9, out) > margin
+            far = _to_world(placed, 0, world, margin + 1e-9, out) > margin
             if around and far:
                 break
             if not (around or far):
@@ -253,40 +240,21 @@ def bodies_hit_world(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def world_collides(
-    q: Array,
-    ints: Ints,
-    floats: Array,
-    shapes: Array,
-    balls: Array,
-    cells: Cells,
-    steps: Cells,
-    frame: Array,
-    margin: float,
-) -> bool:
+def world_collides(q: Array, ints: Ints, floats: Array, world: WorldTables, margin: float) -> bool:
     """Return whether a sphere of a moving body comes as near as `margin` [m] to the world at `q`."""
     n = ints[0]
     R, p = np.empty((n + 1, 9)), np.empty((n + 1, 3))
     place(q, ints, floats, R, p)
-    return bodies_hit_world(R, p, ints, floats, shapes, balls, cells, steps, frame, margin)
+    return bodies_hit_world(R, p, ints, floats, world, margin)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def world_collides_each(
-    Q: Array,
-    ints: Ints,
-    floats: Array,
-    shapes: Array,
-    balls: Array,
-    cells: Cells,
-    steps: Cells,
-    frame: Array,
-    margin: float,
-    out: NDArray[np.bool_],
+    Q: Array, ints: Ints, floats: Array, world: WorldTables, margin: float, out: NDArray[np.bool_]
 ) -> None:
     """Write into `out` (m,) whether each row of `Q` (m, n) collides with the world."""
     for i in range(len(Q)):
-        out[i] = world_collides(Q[i], ints, floats, shapes, balls, cells, steps, frame, margin)
+        out[i] = world_collides(Q[i], ints, floats, world, margin)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -297,11 +265,7 @@ def nearest_world(
     moving: Indices,
     sphere_body: Indices,
     sphere_link: Indices,
-    shapes: Array,
-    balls: Array,
-    cells: Cells,
-    steps: Cells,
-    frame: Array,
+    world: WorldTables,
     cutoff: float,
     distance: Array,
     gradient: Array,
@@ -316,7 +280,7 @@ def nearest_world(
     for m in range(len(moving)):
         i = moving[m]
         link = sphere_link[i]
-        d = _to_world(placed, i, shapes, balls, cells, steps, frame, float(best[link]), out)
+        d = _to_world(placed, i, world, float(best[link]), out)
         if d < best[link]:
             best[link], which[link] = d, i
             for k in range(3):

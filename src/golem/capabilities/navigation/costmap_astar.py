@@ -17,7 +17,7 @@ from golem.capabilities.navigation.behaviour import Action, BehaviourStatus, Fal
 from golem.capabilities.navigation.costmap import INSCRIBED, LETHAL, STEEPEST, Costmap, CostmapConfig
 from golem.capabilities.navigation.footprint import HOME, Footprint
 from golem.capabilities.navigation.goto import GoTo, GoToConfig
-from golem.capabilities.navigation.local_controller import LocalController, LocalControllerConfig
+from golem.capabilities.navigation.local_controller import Around, LocalController, LocalControllerConfig
 from golem.capabilities.navigation.surroundings import Surroundings
 from golem.finite import check_finite
 from golem.interfaces.nav_payloads import NavStep, Scan
@@ -195,7 +195,7 @@ class CostmapAstar:
 
     def step(self, inputs: NavInputs, dt: float) -> NavStep:
         """Return the twist of this step; see `Navigator`."""
-        return replace(self._step(inputs, dt), people=self._people)
+        return replace(self._step(inputs, dt), people=self._around.people)
 
     def _step(self, inputs: NavInputs, dt: float) -> NavStep:
         pose = self._pose = inputs.pose
@@ -222,8 +222,7 @@ class CostmapAstar:
             self._near = True
             self._approach.start(self._goal)
             return self._finish(inputs, dt)
-        s = self._surroundings
-        twist = self._local.follow(pose, self._way, self._goal, self._footprint, s.clearance, s.frame, self._people)
+        twist = self._local.follow(pose, self._way, self._goal, self._footprint, self._around)
         if twist is None:
             return self._stand(left, dt, "The way is blocked.")
         if self._is_stuck(dt):
@@ -260,9 +259,9 @@ class CostmapAstar:
         return ""
 
     @property
-    def _people(self) -> Array:
-        """Those who walk now; see `local_controller.score`."""
-        return self._surroundings.people(self._scan_age)
+    def _around(self) -> Around:
+        s = self._surroundings
+        return Around(s.clearance, s.frame, s.people(self._scan_age))
 
     @property
     def _half_width(self) -> float:
@@ -295,18 +294,15 @@ class CostmapAstar:
         distance = math.hypot(left.x, left.y)
         if distance > self.config.near:
             return False
-        s = self._surroundings
+        around = self._around
         steps = max(1, math.ceil(distance / 0.1))
         between = (self._pose.toward(self._goal, i / steps) for i in range(1, steps + 1))
-        rooms = [self._local.room(p, self._footprint, s.clearance, s.frame) for p in between]
+        rooms = [self._local.room(p, self._footprint, around) for p in between]
         return min(rooms) > 0.5 * self.config.local.margin
 
     def _finish(self, inputs: NavInputs, dt: float) -> NavStep:
-        s = self._surroundings
         step = self._approach.step(inputs, dt)
-        if step.twist != ZERO and not self._local.clear(
-            step.twist, self._pose, self._footprint, s.clearance, s.frame, self._people
-        ):
+        if step.twist != ZERO and not self._local.clear(step.twist, self._pose, self._footprint, self._around):
             self._blocked += dt
             if self._blocked > self.config.patience:
                 self._near, self._way = False, None
@@ -342,10 +338,7 @@ class CostmapAstar:
         self._plan()
         if self._way is None:
             return BehaviourStatus.FAILURE
-        s = self._surroundings
-        twist = self._local.follow(
-            self._pose, self._way, self._goal, self._footprint, s.clearance, s.frame, self._people
-        )
+        twist = self._local.follow(self._pose, self._way, self._goal, self._footprint, self._around)
         return BehaviourStatus.FAILURE if twist is None else BehaviourStatus.SUCCESS
 
     def _clear(self, since: float) -> BehaviourStatus:
@@ -357,12 +350,11 @@ class CostmapAstar:
         if since == 0.0 or self._backed is None:
             self._backed = self._pose
         gone = self._backed.to(self._pose)
-        s = self._surroundings
         twist = Twist(-self.config.local.backward, 0.0, 0.0)
         if math.hypot(gone.x, gone.y) >= self.config.back or since > 4.0 * self.config.back / -twist.vx:
             self._backed = None
             return BehaviourStatus.SUCCESS
-        if not self._local.clear(twist, self._pose, self._footprint, s.clearance, s.frame, self._people):
+        if not self._local.clear(twist, self._pose, self._footprint, self._around):
             self._backed = None
             return BehaviourStatus.FAILURE
         self._twist = twist

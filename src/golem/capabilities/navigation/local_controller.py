@@ -11,6 +11,7 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,15 +26,30 @@ HIT = 1e9
 DOUBT = 0.1
 """By how much more space somebody who walks needs per second that is looked ahead [m/s] [own]."""
 
+NOBODY: Array = np.zeros((0, 5))
+"""People of whom there are none."""
+
+
+class Around(NamedTuple):
+    """What is around the robot, in a map's frame.
+
+    Attributes:
+        clearance: (rows, columns) distance from the nearest obstacle [m].
+        frame: (5,) x, y, cosine and sine of the corner of `clearance`, and its resolution [m].
+        people: (k, 5) those who walk: place [m] and velocity [m/s], and radius [m].
+    """
+
+    clearance: Array
+    frame: Array
+    people: Array = NOBODY
+
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def score(
     twists: Array,
     pose: Array,
     samples: Array,
-    clearance: Array,
-    frame: Array,
-    people: Array,
+    around: Around,
     aim: Array,
     weights: Array,
     horizon: Array,
@@ -47,9 +63,6 @@ def score(
         twists: (n, 3) vx, vy, wz.
         pose: (3,) of base_link in the frame of the map.
         samples: (m, 2) places on the footprint's edge in base_link.
-        clearance: (rows, columns) distance from the nearest obstacle [m].
-        frame: (5,) x, y, cosine and sine of the map's corner, and its resolution.
-        people: (k, 5) those who walk: place [m] and velocity [m/s] in the frame of the map, and radius [m].
         aim: (3,) place to come near, and heading to have there, in the frame of the map.
         weights: (4,) per metre from the aim, per radian off its heading, of nearness, and the clearance that is asked
             for [m].
@@ -60,6 +73,7 @@ def score(
         spare: (n,) written: the least distance of base_link from people [m], far below zero where the twist hits an
             obstacle.
     """
+    clearance, frame, people = around.clearance, around.frame, around.people
     rows, columns = clearance.shape
     steps, last = int(round(horizon[0] / horizon[1])), int(round(horizon[2] / horizon[1]))
     for i in range(len(twists)):
@@ -138,8 +152,6 @@ class LocalControllerConfig:
         require("local option ", *((n, v, 0.0 < v < math.inf, "a positive number") for n, v in rows))
 
 
-NOBODY: Array = np.zeros((0, 5))
-"""People of whom there are none."""
 GAIN = 0.05
 """Distance from people that evading must win [m]."""
 STEP = 0.2
@@ -167,14 +179,7 @@ class LocalController:
         )
 
     def follow(
-        self,
-        pose: PlanarPose,
-        way: Way,
-        goal: PlanarPose,
-        footprint: Footprint,
-        clearance: Array,
-        frame: Array,
-        people: Array = NOBODY,
+        self, pose: PlanarPose, way: Way, goal: PlanarPose, footprint: Footprint, around: Around
     ) -> Twist | None:
         """Return the best twist, or one out of the way of people; None where each leads into an obstacle.
 
@@ -182,9 +187,6 @@ class LocalController:
             pose: of base_link in the frame of the map.
             way: where to go.
             goal: where that ends.
-            clearance: of the window around the robot, see `local_controller.score`.
-            frame: of that window.
-            people: those who walk, likewise.
         """
         i, _ = way.nearest(pose)
         left = way.left(i)
@@ -194,46 +196,37 @@ class LocalController:
         # Towards the goal it goes as fast as it can stop; facing away it turns before it walks.
         fastest = min(self.config.forward, max(0.2, 0.8 * left))
         fastest *= max(0.25, math.cos(min(abs(turn), math.pi / 2)))
-        room = self.room(pose, footprint, clearance, frame)
+        room = self.room(pose, footprint, around)
         if room < self.config.slow:
             fastest *= max(0.35, room / self.config.slow)
         twists = self._twists * np.array([fastest / self.config.forward, 1.0, 1.0])
         aim = np.array([ahead.x, ahead.y, heading])
-        scores, _, _ = self._score(twists, pose, footprint, clearance, frame, people, aim)
+        scores, _, _ = self._score(twists, pose, footprint, around, aim)
         best = int(scores.argmin())
         if scores[best] < HIT / 2:
             return Twist(*(float(v) for v in twists[best]))
-        return self._evaded(pose, footprint, clearance, frame, people)
+        return self._evaded(pose, footprint, around)
 
-    def _evaded(
-        self, pose: PlanarPose, footprint: Footprint, clearance: Array, frame: Array, people: Array
-    ) -> Twist | None:
+    def _evaded(self, pose: PlanarPose, footprint: Footprint, around: Around) -> Twist | None:
         """Return the twist that leaves those who come most room; None where standing is as good."""
-        if not len(people):
+        if not len(around.people):
             return None
         twists, here = np.vstack([self._twists, np.zeros(3)]), np.array([pose.x, pose.y, pose.yaw])
-        _, hits, spare = self._score(twists, pose, footprint, clearance, frame, people, here)
+        _, hits, spare = self._score(twists, pose, footprint, around, here)
         best = int(spare.argmax())
         if not np.isfinite(hits[-1]) or spare[best] < spare[-1] + GAIN:
             return None
         return Twist(*(float(v) for v in twists[best]))
 
-    def clear(
-        self,
-        twist: Twist,
-        pose: PlanarPose,
-        footprint: Footprint,
-        clearance: Array,
-        frame: Array,
-        people: Array = NOBODY,
-    ) -> bool:
+    def clear(self, twist: Twist, pose: PlanarPose, footprint: Footprint, around: Around) -> bool:
         """Return whether a twist leads into no obstacle within the horizon; arguments as for `follow`."""
         twists, here = np.array([[twist.vx, twist.vy, twist.wz]]), np.array([pose.x, pose.y, pose.yaw])
-        _, hits, _ = self._score(twists, pose, footprint, clearance, frame, people, here)
+        _, hits, _ = self._score(twists, pose, footprint, around, here)
         return not np.isfinite(hits[0])
 
-    def room(self, pose: PlanarPose, footprint: Footprint, clearance: Array, frame: Array) -> float:
+    def room(self, pose: PlanarPose, footprint: Footprint, around: Around) -> float:
         """Return the distance of the footprint from the nearest obstacle [m]."""
+        clearance, frame = around.clearance, around.frame
         u = footprint.at(pose) - frame[:2]
         column = np.floor((frame[2] * u[:, 0] + frame[3] * u[:, 1]) / frame[4]).astype(int)
         row = np.floor((frame[2] * u[:, 1] - frame[3] * u[:, 0]) / frame[4]).astype(int)
@@ -242,28 +235,10 @@ class LocalController:
         return float(clearance[row[inside], column[inside]].min(initial=10.0))
 
     def _score(
-        self,
-        twists: Array,
-        pose: PlanarPose,
-        footprint: Footprint,
-        clearance: Array,
-        frame: Array,
-        people: Array,
-        aim: Array,
+        self, twists: Array, pose: PlanarPose, footprint: Footprint, around: Around, aim: Array
     ) -> tuple[Array, Array, Array]:
         scores, hits, spare = (np.empty(len(twists)) for _ in range(3))
-        score(
-            twists,
-            np.array([pose.x, pose.y, pose.yaw]),
-            footprint.samples,
-            clearance,
-            frame,
-            people,
-            aim,
-            np.array([*WEIGHTS, self.config.margin]),
-            np.array([self.config.horizon, STEP, self.config.yields]),
-            scores,
-            hits,
-            spare,
-        )
+        here, weights = np.array([pose.x, pose.y, pose.yaw]), np.array([*WEIGHTS, self.config.margin])
+        horizon = np.array([self.config.horizon, STEP, self.config.yields])
+        score(twists, here, footprint.samples, around, aim, weights, horizon, scores, hits, spare)
         return scores, hits, spare

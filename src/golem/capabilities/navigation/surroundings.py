@@ -82,7 +82,7 @@ class Surroundings:
         self._window(costmap, pose)
 
     def people(self, age: float) -> Array:
-        """Return those who walk, `age` [s] after the newest scan; see `local_controller.score`."""
+        """Return those who walk, `age` [s] after the newest scan; see `local_controller.Around`."""
         people = self._movers.people(self._seen + age)
         people[:, 4] += self._shy
         return people

@@ -117,10 +117,8 @@ class JointSpace:
         for row, rule in zip(rows, self.rules, strict=True):
             side: Side = "left" if isinstance(rule, Balanced) else rule.side
             row[:] = rule.row(*robot.hands[side], self.centre_of_mass(q))
-        self.space = Space(
-            model.ints, model.floats, *(world or World()).arrays(), robot.lower, robot.upper, rows,
-            robot.masses, np.array(margins),
-        )  # fmt: skip
+        tables, bounds = (world or World()).tables, (robot.lower, robot.upper)
+        self.space = Space(model.ints, model.floats, tables, *bounds, rows, robot.masses, np.array(margins))
 
     def shrunk(self, margins: tuple[float, float]) -> JointSpace:
         """Return the same space with other margins [m]."""

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from golem.capabilities.collision.sphere_kernel import Indices, Ints, bodies_collide, place
-from golem.capabilities.collision.world_kernel import Cells, bodies_hit_world
+from golem.capabilities.collision.world_kernel import WorldTables, bodies_hit_world
 from golem.kernels import njit
 from golem.types import Array
 
@@ -30,7 +30,7 @@ class Space(NamedTuple):
 
     Attributes:
         ints, floats: the robot, see `sphere_kernel`.
-        shapes, balls, cells, steps, frame: the world, see `world_kernel`.
+        world: what stands around, see `world_kernel`.
         lower, upper: (n,) range of the joints [rad].
         rules: (k, 12).
         masses: (n + 1, 4) centre of mass of each body in its frame [m], and its share of the robot's mass.
@@ -39,11 +39,7 @@ class Space(NamedTuple):
 
     ints: Ints
     floats: Array
-    shapes: Array
-    balls: Array
-    cells: Cells
-    steps: Cells
-    frame: Array
+    world: WorldTables
     lower: Array
     upper: Array
     rules: Array
@@ -101,10 +97,8 @@ def verdict(q: Array, space: Space) -> int:
         return RULE + rule
     if bodies_collide(R, p, space.ints, space.floats, space.margins[0]):
         return ITSELF
-    if len(space.shapes) + len(space.balls) > 0 and bodies_hit_world(
-        R, p, space.ints, space.floats, space.shapes, space.balls, space.cells, space.steps, space.frame,
-        space.margins[1],
-    ):  # fmt: skip
+    solid = len(space.world.shapes) + len(space.world.balls) > 0
+    if solid and bodies_hit_world(R, p, space.ints, space.floats, space.world, space.margins[1]):
         return WORLD
     return FREE
 

@@ -10,7 +10,7 @@ from golem.capabilities.mapping.voxel_grid import VoxelGridMapper
 from golem.capabilities.navigation.astar import Way, astar
 from golem.capabilities.navigation.costmap import INSCRIBED, Costmap
 from golem.capabilities.navigation.footprint import HOME
-from golem.capabilities.navigation.local_controller import LocalController, LocalControllerConfig
+from golem.capabilities.navigation.local_controller import Around, LocalController, LocalControllerConfig
 from golem.evaluation.conformance.room import HEIGHT, ROOM, MadeWalk
 from golem.interfaces.nav_payloads import OccupancyGrid, Scan
 from golem.types import Array, PlanarPose
@@ -40,7 +40,7 @@ def navigation_times(timed: Timed, n: int) -> list[tuple[str, Array, str]]:
     way, frame = Way(np.linspace((1.0, 1.0), (4.0, 4.0), 80)), np.array([0.0, 0.0, 1.0, 0.0, 0.05])
 
     def follow(i: int) -> object:
-        return local.follow(pose, way, goal, HOME, costmap.clearance, frame)
+        return local.follow(pose, way, goal, HOME, Around(costmap.clearance, frame))
 
     search(0)
     follow(0)
