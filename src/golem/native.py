@@ -8,7 +8,9 @@ has then changed nothing, and the module's Python code has to do the tick.
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -18,6 +20,7 @@ from numba.extending import intrinsic as _intrinsic
 from numba.np.numpy_support import from_dtype
 from numpy.typing import NDArray
 
+from golem.kernels import cfunc
 from golem.types import LEGS, NUM_JOINTS, TICK, UPPER
 
 Record = Any
@@ -102,6 +105,11 @@ RECORD = _layout(
 """
 STAGE = types.int64(types.int64, types.int64)
 """The signature of a compiled stage: addresses of the shared record and of its own memory."""
+
+
+def stage_code(stage: Callable[[int, int], int]) -> Callable[[], Any]:
+    """Return a function that compiles `stage` at its first call, and returns the compiled one."""
+    return cache(lambda: cfunc(STAGE, cache=True)(stage))
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from functools import cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,8 +25,8 @@ from golem.hardware.estimator.compiled import CompiledEstimator
 from golem.hardware.estimator.feet import FEET, FLOOR, FeetConfig, forget_feet, level_floor, put_feet, sense_feet
 from golem.hardware.estimator.feet_kernel import in_torso
 from golem.hardware.estimator.invariant_kernel import SIZE
-from golem.kernels import cfunc, njit
-from golem.native import ORDINARY, STAGE, UNUSUAL, CompiledStage, Record, Records, new_record, shared, view
+from golem.kernels import njit
+from golem.native import ORDINARY, UNUSUAL, CompiledStage, Record, Records, new_record, shared, stage_code, view
 from golem.robots.model.imu_mount import TORSO, turn_to_base
 from golem.robots.model.spatial import skew
 from golem.robots.model.table import FRAMES
@@ -292,17 +290,13 @@ def _pose(filter: Record, waist: Array, T: Array) -> None:
     T[3, 3] = 1.0
 
 
-def _step(record: int, memory: int) -> int:
+@stage_code
+def _code(record: int, memory: int) -> int:
     r = shared(record)
     if not finite_state(r):
         return UNUSUAL
     invariant_ekf(r, _memory_at(memory))
     return ORDINARY
-
-
-@cache
-def _code() -> Any:
-    return cfunc(STAGE, cache=True)(_step)
 
 
 class InvariantEKF(CompiledEstimator):

@@ -13,8 +13,6 @@ treated alike, and a mirrored measurement gives the mirrored estimate.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +21,8 @@ from golem.finite import finite_state
 from golem.hardware.estimator.attitude import GYRO_BIAS, Attitude, base_rotation, track_bias
 from golem.hardware.estimator.compiled import CompiledEstimator
 from golem.hardware.estimator.feet import FEET, FLOOR, FeetConfig, forget_feet, level_floor, put_feet, sense_feet
-from golem.kernels import cfunc, njit
-from golem.native import ORDINARY, STAGE, UNUSUAL, CompiledStage, Record, Records, new_record, shared, view
+from golem.kernels import njit
+from golem.native import ORDINARY, UNUSUAL, CompiledStage, Record, Records, new_record, shared, stage_code, view
 from golem.robots.model.imu_mount import TORSO, turn_to_base
 from golem.robots.model.spatial import skew
 from golem.types import Array, LowState
@@ -230,17 +228,13 @@ def random_walk(r: Record, m: Record) -> None:
     r.base_t = r.state_t
 
 
-def _step(record: int, memory: int) -> int:
+@stage_code
+def _code(record: int, memory: int) -> int:
     r = shared(record)
     if not finite_state(r):
         return UNUSUAL
     random_walk(r, _memory_at(memory))
     return ORDINARY
-
-
-@cache
-def _code() -> Any:
-    return cfunc(STAGE, cache=True)(_step)
 
 
 class RandomWalkKF(CompiledEstimator):

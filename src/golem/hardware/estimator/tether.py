@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from functools import cache
-from typing import Any
-
 import numpy as np
 
 from golem.finite import finite_state
 from golem.hardware.estimator.attitude import Attitude, base_rotation
 from golem.hardware.estimator.compiled import CompiledEstimator
-from golem.kernels import cfunc, njit
-from golem.native import ORDINARY, STAGE, UNUSUAL, CompiledStage, Record, new_record, shared, view
+from golem.kernels import njit
+from golem.native import ORDINARY, UNUSUAL, CompiledStage, Record, new_record, shared, stage_code, view
 from golem.robots.model.imu_mount import TORSO
 from golem.types import LowState
 
@@ -31,17 +28,13 @@ def tether(r: Record, m: Record) -> None:
     r.base_t = r.state_t
 
 
-def _step(record: int, memory: int) -> int:
+@stage_code
+def _code(record: int, memory: int) -> int:
     r = shared(record)
     if not finite_state(r):
         return UNUSUAL
     tether(r, _memory_at(memory))
     return ORDINARY
-
-
-@cache
-def _code() -> Any:
-    return cfunc(STAGE, cache=True)(_step)
 
 
 class TetherEstimator(CompiledEstimator):

@@ -16,8 +16,6 @@ knows: where it gives one, the servo adds nothing of its own to the legs and lea
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
-from typing import Any
 
 import numpy as np
 
@@ -25,8 +23,8 @@ from golem.finite import check_finite, check_measured, finite_state
 from golem.hardware.safety.base import SafetyLimits
 from golem.hardware.servo.gains import Gains, default_gains
 from golem.hardware.servo.gravity import body_tree, gravity_in_base
-from golem.kernels import cfunc, njit
-from golem.native import ORDINARY, STAGE, UNUSUAL, CompiledStage, Record, new_record, new_shared, own, shared, view
+from golem.kernels import njit
+from golem.native import ORDINARY, UNUSUAL, CompiledStage, Record, new_record, new_shared, own, shared, stage_code, view
 from golem.native_messages import command_of, put_legs, put_state
 from golem.robots.model.imu_mount import TORSO
 from golem.robots.model.leg_kernel import tree_dtype, tree_gravity
@@ -127,17 +125,13 @@ def _finite_targets(r: Record) -> bool:
     return total == 0.0
 
 
-def _step(record: int, memory: int) -> int:
+@stage_code
+def _code(record: int, memory: int) -> int:
     r = shared(record)
     if not (finite_state(r) and _finite_targets(r)):
         return UNUSUAL
     servo(r, _memory_at(memory))
     return ORDINARY
-
-
-@cache
-def _code() -> Any:
-    return cfunc(STAGE, cache=True)(_step)
 
 
 class Servo:

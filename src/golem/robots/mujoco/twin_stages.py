@@ -12,11 +12,10 @@ import mujoco
 import numpy as np
 from mujoco.introspect import ast_nodes, structs
 
-from golem.kernels import cfunc, njit
+from golem.kernels import njit
 from golem.native import (
     LOOK,
     ORDINARY,
-    STAGE,
     UNUSUAL,
     Record,
     address,
@@ -25,6 +24,7 @@ from golem.native import (
     ints,
     library_function,
     shared,
+    stage_code,
     view,
     words,
 )
@@ -261,7 +261,9 @@ def let_pass(r: Record, m: Record) -> None:
         m.time += step
 
 
-def _sense(record: int, memory: int) -> int:
+@stage_code
+def sense_code(record: int, memory: int) -> int:
+    """Sense; see `native.STAGE`."""
     m = _memory_at(memory)
     if m.imu.used >= BLOCK:
         return UNUSUAL
@@ -269,22 +271,12 @@ def _sense(record: int, memory: int) -> int:
     return ORDINARY
 
 
-def _act(record: int, memory: int) -> int:
+@stage_code
+def act_code(record: int, memory: int) -> int:
+    """Let time pass; see `native.STAGE`."""
     r, m = shared(record), _memory_at(memory)
     # Motors without a command of late are limp, and the length of a step is the model's.
     if r.t - r.command_t > COMMAND_AGE or delicate(m) != (m.fine != 0):
         return UNUSUAL
     let_pass(r, m)
     return LOOK if m.kinds and touching(m) else ORDINARY
-
-
-@cache
-def sense_code() -> Any:
-    """Return the compiled stage that senses; see `native.STAGE`."""
-    return cfunc(STAGE, cache=True)(_sense)
-
-
-@cache
-def act_code() -> Any:
-    """Return the compiled stage in which time passes; see `native.STAGE`."""
-    return cfunc(STAGE, cache=True)(_act)
