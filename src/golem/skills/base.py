@@ -56,6 +56,11 @@ class SkillResult:
             if not math.isfinite(seconds):
                 raise TypeError(f"the timing '{name}' of a result is {seconds}")
 
+    def check(self, slot: str) -> None:
+        """Raise a `StageFailed`, of `slot` where the result names none, unless this is a success."""
+        if not self.success:
+            raise StageFailed(self.stage, self.slot or slot, self.reason)
+
 
 def expect(what: str, value: object, kind: type[Any]) -> None:
     """Raise a `TypeError` unless `value`, called `what`, is a `kind`."""

@@ -171,6 +171,19 @@ class LegsInterface:
         silence = self._context.bus.latest(topics.ODOMETRY_SILENCE)
         return "" if silence is None else silence.why
 
+    def check_walking(self) -> None:
+        """Check that these are legs that can walk.
+
+        Raises:
+            ConfigError: they cannot.
+            StageFailed: they do not report.
+        """
+        legs = self.status
+        if legs.speed == 0.0:
+            raise ConfigError(
+                f"The legs, '{legs.controller}', do not walk; give the stack a lower_body that does, such as almi."
+            )
+
     def check_located(self) -> None:
         """Check that an odometry that this stack has knows where the robot is.
 

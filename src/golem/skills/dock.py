@@ -174,10 +174,7 @@ class Dock:
     async def _dock(self, context: Context, goal: DockGoal) -> SkillResult:
         start, navigator = context.t, GoTo(APPROACH)
         await context.until(lambda: context.legs.reporting, FIRST_REPORT)
-        if context.legs.status.speed == 0.0:
-            raise ConfigError(
-                f"The legs, '{context.legs.status.controller}', do not walk; choose others, such as almi."
-            )
+        context.legs.check_walking()
         view, approaches = await self._look(context, goal), 0
         while not _good(view, goal) and approaches < goal.approaches:
             if view.distance > FARTHEST:

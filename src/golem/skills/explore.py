@@ -8,7 +8,6 @@ from pathlib import Path
 
 from golem.capabilities.mapping.map_file import CLOUD, load_map
 from golem.capabilities.navigation.frontiers import frontiers
-from golem.errors import ConfigError
 from golem.interfaces import topics
 from golem.interfaces.nav_payloads import MapFile
 from golem.middleware.bus import News
@@ -80,10 +79,7 @@ class Explore:
     async def _explore(self, context: Context, goal: ExploreGoal) -> SkillResult:
         start, path = context.t, self._file(goal.save) if goal.save else None
         await context.until(lambda: context.legs.reporting, FIRST_REPORT)
-        if context.legs.status.speed == 0.0:
-            raise ConfigError(
-                f"The legs, '{context.legs.status.controller}', do not walk; choose others, such as almi."
-            )
+        context.legs.check_walking()
         if not await context.until(lambda: context.mapped, FIRST_MAP):
             context.legs.check_located()
             raise StageFailed("locate", "mapper", f"There is no map after {FIRST_MAP:g} s.")

@@ -226,8 +226,7 @@ class Fetch:
             result = await self._search(context, goal, report, places) or result
         if result is None:
             raise StageFailed("recall", "memory", f"Nothing is remembered of '{goal.text}', nor seen of it.")
-        if not result.success:
-            raise StageFailed(result.stage, result.slot or "skill", result.reason)
+        result.check("skill")
         return result.value if isinstance(result.value, TakeReport) else TakeReport()
 
     async def _remembered(self, context: Context, goal: FetchGoal) -> list[RecalledPlace]:
@@ -322,9 +321,7 @@ class Fetch:
 
     async def _navigate(self, context: Context, target: PlanarPose) -> None:
         goal = NavigateGoal(target.x, target.y, target.yaw, "odom", content=0.1)
-        walked = await context.run("navigate", goal)
-        if not walked.success:
-            raise StageFailed(walked.stage, walked.slot or "navigator", walked.reason)
+        (await context.run("navigate", goal)).check("navigator")
 
     async def _bring(
         self,
@@ -358,9 +355,7 @@ class Fetch:
         off = PlanarPose(0.0, 0.0, turned) @ PlanarPose(taken.off_x, taken.off_y, 0.0)
         x, y, below, above = float(spot[0]), float(spot[1]), taken.below, taken.above
         there = PlaceGoal(x, y, "odom", side, below, above, aside, (off.x, off.y), taken.radius)
-        placed = await context.run("place", there)
-        if not placed.success:
-            raise StageFailed(placed.stage, placed.slot or "skill", placed.reason)
+        (await context.run("place", there)).check("skill")
         report.x, report.y = float(spot[0]), float(spot[1])
         return f"The {goal.text} was set down at ({spot[0]:.2f}, {spot[1]:.2f}) in odom."
 

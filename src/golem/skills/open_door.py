@@ -17,6 +17,7 @@ from golem.interfaces.payloads import GripState
 from golem.options import require
 from golem.skills.base import SkillCancelled, SkillResult, StageFailed
 from golem.skills.context import Context
+from golem.skills.force_guard import CLOSED
 from golem.skills.handle_look import seen_before
 from golem.skills.poses import retracted
 from golem.types import Array, LocalizedObject, Side
@@ -24,8 +25,6 @@ from golem.types import Array, LocalizedObject, Side
 if TYPE_CHECKING:
     from golem.skills.planned_motion import PlannedMotion
 
-CLOSED = (GripState.HOLDING, GripState.EMPTY)
-"""States of a hand whose fingers have closed, on something or on nothing."""
 SPARED = 0.07
 """Radius around points of the handle within which nothing is in the hand's way [m]."""
 EVERY = 0.08
@@ -169,7 +168,7 @@ class OpenDoor:
         if side is not None:
             await self._release(context, side)
             if not result.success:
-                await self._home(context, motion, side, home)
+                await motion.rest(home, side, self._config.travel_speed, "release")
         timings["total"] = context.t - timings.pop("start")
         if result.success:
             angle = np.rad2deg(self._report.angle)
@@ -223,16 +222,14 @@ class OpenDoor:
     ) -> Grasp:
         """Bring the open hand before the handle; returns the grasp that it can go on to."""
         from golem.skills.planned_motion import Then
-        from golem.skills.travel import APPROACH, failed
+        from golem.skills.travel import APPROACH, blaming
 
         method = context.grasp_method()
         motion.look([(point, SPARED) for point in spaced(whole, EVERY)])
         speed = self._config.travel_speed
         context.say("approach", "Bringing the arm before the door.")
-        try:
+        with blaming("approach"):
             await motion.to_joints(posture(f"forward_{side}"), [side], speed)
-        except PlanRefused as refusal:
-            raise failed("approach", refusal) from refusal
         approach = (-float(door.normal[0]), -float(door.normal[1]), 0.0)
         grasps = await context.propose(method, handle, side, 0.0, approach)
         if not grasps:
@@ -250,17 +247,16 @@ class OpenDoor:
             except PlanRefused as refusal:
                 refused = refused or refusal
         assert refused is not None
-        raise failed("approach", refused) from refused
+        with blaming("approach"):
+            raise refused
 
     async def _grasp(self, context: Context, motion: PlannedMotion, grasp: Grasp, side: Side) -> None:
-        from golem.skills.travel import APPROACH, failed
+        from golem.skills.travel import APPROACH, blaming
 
         arm, hand = context.arms[side], context.hands[side]
         context.say("reach", "Straight to the handle.")
-        try:
+        with blaming("reach"):
             await motion.line(side, grasp.T_odom_gripper, self._config.reach_speed, tolerance=APPROACH)
-        except PlanRefused as refusal:
-            raise failed("reach", refusal) from refusal
         await arm.settle(self._config.tolerance, 2.0)
         context.say("grasp", f"Closing with {self._config.force:g} N per finger.", side=side)
         hand.close(self._config.force)
@@ -306,10 +302,3 @@ class OpenDoor:
         await context.until(lambda: hand.status.state is GripState.OPEN, 2.0)
         if arm.sent:
             await arm.move(retracted(arm.commanded, self._config.back), self._config.travel_speed)
-
-    async def _home(self, context: Context, motion: PlannedMotion, side: Side, home: Array) -> None:
-        motion.look()
-        try:
-            await motion.to_joints(home, [side], self._config.travel_speed)
-        except PlanRefused as refusal:
-            context.say("release", f"The arm stays where it is: {refusal}")

@@ -15,7 +15,7 @@ from golem.interfaces.payloads import GripState
 from golem.skills.base import SkillCancelled, SkillResult, StageFailed
 from golem.skills.context import Context
 from golem.skills.finger_room import FingerRoom
-from golem.skills.force_guard import ForceGuard
+from golem.skills.force_guard import CLOSED, ForceGuard
 from golem.skills.pack_view import see_fasteners
 from golem.skills.pick_config import (
     PickConfig,
@@ -69,9 +69,6 @@ async def pull(context: Context, config: PickConfig, travel: Travel, attempt: At
         text = f"The {attempt.label} slipped out of the fingers."
         raise PickFailed(slipped(heights), "extract", "grasp_method", text)
 
-
-CLOSED = (GripState.HOLDING, GripState.EMPTY)
-"""States of a hand whose fingers have closed, on something or on nothing."""
 
 FINAL = (PickOutcome.TIGHT, PickOutcome.OUT_OF_REACH)
 """What a second try with the same hand would not change."""

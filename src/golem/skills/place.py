@@ -230,7 +230,7 @@ class SetDown:
     async def _carry(self, context: Context, motion: PlannedMotion, goal: PlaceGoal, side: Side, spot: Array) -> None:
         """Bring the hand above the place, what it holds upright."""
         from golem.skills.planned_motion import Then
-        from golem.skills.travel import APPROACH, OVER, failed
+        from golem.skills.travel import APPROACH, OVER, blaming
 
         c, arm = self._config, context.arms[side]
         below = goal.below or c.unknown
@@ -259,7 +259,8 @@ class SetDown:
             except PlanRefused as refusal:
                 refused = refused or refusal
         assert refused is not None
-        raise failed("carry", refused) from refused
+        with blaming("carry"):
+            raise refused
 
     @staticmethod
     def _scene(context: Context, goal: PlaceGoal, T: Array) -> Array:
@@ -337,11 +338,7 @@ class SetDown:
         await arm.move(T, 0.5 * c.travel_speed)
         if T[2, 2] > -0.9:
             await arm.move(lifted(T, 0.5 * c.back), c.travel_speed)
-        motion.look()
-        try:
-            await motion.to_joints(posture("home"), [side], c.travel_speed)
-        except PlanRefused as refusal:
-            context.say("release", f"The arm stays where it is: {refusal}")
+        await motion.rest(posture("home"), side, c.travel_speed, "release")
 
     def _stands(self, context: Context, goal: PlaceGoal, spot: Array) -> None:
         """Look whether it stands where it was set down, as far as the head camera shows the place.

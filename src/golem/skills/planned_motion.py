@@ -166,6 +166,14 @@ class PlannedMotion:
         await self._follow(plan, sides)
         return plan
 
+    async def rest(self, goal: Array, side: Side, hand_speed: float, stage: str) -> None:
+        """Look, and bring an arm to the joints `goal` (15,) [rad]; what cannot get there stays, and `stage` says so."""
+        self.look()
+        try:
+            await self.to_joints(goal, [side], hand_speed)
+        except PlanRefused as refusal:
+            self._context.say(stage, f"The arm stays where it is: {refusal}")
+
     async def _start(self, held: Sequence[Held] = ()) -> tuple[Array, World]:
         """Return the joints to plan from, and the world without what the robot would touch there: it is there.
 

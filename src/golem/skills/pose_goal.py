@@ -42,15 +42,12 @@ def check_reach(context: Context, distance: float, timeout: float) -> None:
         ConfigError: they cannot.
         StageFailed: they do not report.
     """
-    legs = context.legs.status
-    if legs.speed == 0.0:
-        raise ConfigError(
-            f"The legs, '{legs.controller}', do not walk; give the stack a lower_body that does, such as almi."
-        )
-    reach = legs.speed * timeout
+    context.legs.check_walking()
+    speed = context.legs.status.speed
+    reach = speed * timeout
     if distance > reach:
         raise ConfigError(
-            f"It is {distance:.3g} m away; at {legs.speed:.2g} m/s the legs get {reach:.3g} m within {timeout:g} s."
+            f"It is {distance:.3g} m away; at {speed:.2g} m/s the legs get {reach:.3g} m within {timeout:g} s."
         )
 
 

@@ -136,10 +136,7 @@ class Recall:
 
     async def run(self, context: Context, goal: RecallGoal) -> SkillResult:
         """Ask; see `Skill`."""
-        try:
-            found = await ask(context, goal.text, goal.when, goal.ago, goal.limit)
-        except StageFailed as failure:
-            return SkillResult(False, failure.stage, failure.slot, str(failure))
+        found = await ask(context, goal.text, goal.when, goal.ago, goal.limit)
         text = sentence(found) if found.places else f"Nothing is remembered of '{goal.text}'."
         context.say("done", text)
         return SkillResult(True, "done", None, text, value=found)

@@ -12,7 +12,7 @@ from golem.capabilities.navigation.frontiers import frontiers
 from golem.errors import ConfigError
 from golem.interfaces import topics
 from golem.options import require
-from golem.skills.base import SkillResult, StageFailed
+from golem.skills.base import SkillResult
 from golem.skills.context import Context
 from golem.skills.fetch import STAGE, TURN, before
 from golem.skills.navigate import NavigateGoal
@@ -83,10 +83,7 @@ class Search:
     async def _look(self, context: Context, goal: SearchGoal) -> SkillResult | None:
         """Look from here; return where it is, if it is seen."""
         await context.run("remember", RememberGoal((goal.text,), LOOK))
-        try:
-            seen = await ask(context, goal.text, "now", None, 3)
-        except StageFailed as failure:
-            return SkillResult(False, failure.stage, failure.slot, str(failure))
+        seen = await ask(context, goal.text, "now", None, 3)
         seen.places = [place for place in seen.places if place.last_seen < AGO and place.evidence == "seen"]
         if not seen.places:
             return None

@@ -204,7 +204,7 @@ class Take:
     ) -> Grasp:
         """Bring one hand before the thing along one approach, look again, and return the grasp to go on to."""
         from golem.skills.palm_look import PalmLook
-        from golem.skills.travel import failed
+        from golem.skills.travel import blaming
 
         c, way = self._config, self._way(context, target, kind)
         yaw = 0.5 * math.pi if side == "left" else -0.5 * math.pi
@@ -212,24 +212,20 @@ class Take:
         context.say("approach", f"Bringing the {side} hand before the {target.label}, {kind}.", side=side)
         context.hands[side].open(MAX_GAP)
         scene = context.scene("head")
-        try:
+        with blaming("approach"):
             name = f"{'ready' if kind == TOP else 'forward'}_{side}"
             await motion.to_joints(posture(name), [side], c.travel_speed)
             look = PalmLook(context, motion, side, c)
             if c.look_again:
                 target, scene, way = await look.at(target, way, yaw)
                 self._report.off_x, self._report.off_y = look.off.tolist()
-        except PlanRefused as refusal:
-            raise failed("approach", refusal) from refusal
         grasps = await context.propose(method, target, side, yaw, (way[0], way[1], way[2]), scene)
         if not grasps:
             raise StageFailed("approach", "grasp_method", f"No grasp was proposed for the {target.label}.")
         grasp = await self._reach_before(context, motion, side, grasps)
         if c.look_again:
-            try:
+            with blaming("approach"):
                 grasp, view = await look.before(target, scene, grasp)
-            except PlanRefused as refusal:
-                raise failed("approach", refusal) from refusal
             target, scene = replace(target, points=view.thing), view.around
         self._measure(scene, target, grasp)
         return grasp
@@ -251,7 +247,7 @@ class Take:
         Those that the arm alone reaches from where it is are tried first: a planner takes longer to refuse.
         """
         from golem.skills.planned_motion import Then
-        from golem.skills.travel import APPROACH, failed
+        from golem.skills.travel import APPROACH, blaming
 
         c, refused = self._config, list[PlanRefused]()
         for grasp in reached_first(context, side, grasps, c.before)[: c.attempts]:
@@ -262,7 +258,8 @@ class Take:
                 return grasp
             except PlanRefused as refusal:
                 refused.append(refusal)
-        raise failed("approach", refused[0]) from refused[0]
+        with blaming("approach"):
+            raise refused[0]
 
     def _measure(self, points: Array, target: LocalizedObject, grasp: Grasp) -> None:
         """Report how high the fingertips take the thing, by `points` (n, 3) around it."""
@@ -288,16 +285,14 @@ class Take:
             self._report.aside_y = 0.0
 
     async def _grasp(self, context: Context, motion: PlannedMotion, side: Side, grasp: Grasp) -> None:
-        from golem.skills.travel import APPROACH, failed
+        from golem.skills.travel import APPROACH, blaming
 
         c, arm, hand = self._config, context.arms[side], context.hands[side]
         hand.open(min(grasp.gap + SPARE, MAX_GAP))
         context.say("reach", "Straight to it.", side=side, target=grasp.T_odom_gripper[:3, 3].tolist())
         await context.until(lambda: hand.status.state is GripState.OPEN, 1.0)
-        try:
+        with blaming("reach"):
             await motion.line(side, grasp.T_odom_gripper, c.reach_speed, tolerance=APPROACH)
-        except PlanRefused as refusal:
-            raise failed("reach", refusal) from refusal
         await arm.settle(c.tolerance, 2.0)
         context.say("grasp", f"Closing with {self.force:.3g} N per finger.", side=side)
         # Softly first: the finger that touches first waits for the other instead of pushing the thing over.
@@ -334,8 +329,4 @@ class Take:
         context.hands[side].open(MAX_GAP)
         if arm.sent:
             await arm.move(retracted(arm.commanded, self._config.before), self._config.travel_speed)
-        motion.look()
-        try:
-            await motion.to_joints(home, [side], self._config.travel_speed)
-        except PlanRefused as refusal:
-            context.say("approach", f"The arm stays where it is: {refusal}")
+        await motion.rest(home, side, self._config.travel_speed, "approach")

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Protocol
 
 import numpy as np
@@ -158,10 +159,8 @@ class PlannedTravel:
         if np.abs(self._home - home)[1:].max() < HANGING:
             return
         self._context.say("begin", "Raising the arms.")
-        try:
+        with blaming("begin"):
             await self._motion.to_joints(home, SIDES, speed)
-        except PlanRefused as refusal:
-            raise failed("begin", refusal) from refusal
         self._home = home
 
     def look(self, targets: Sequence[Array]) -> None:
@@ -206,10 +205,8 @@ class PlannedTravel:
         self, side: Side, T_goal: Array, speed: float, stage: str, stop: Callable[[], bool] = _never
     ) -> None:
         """Go if the hand can keep to the line; see `Travel`."""
-        try:
+        with blaming(stage):
             await self._motion.line(side, T_goal, speed, stop, PULL)
-        except PlanRefused as refusal:
-            raise failed(stage, refusal) from refusal
 
     async def home(self, side: Side, speed: float) -> None:
         """Go back to the joints it began with, or, where no way is found, along lines; see `Travel`."""
@@ -219,14 +216,16 @@ class PlannedTravel:
             await self._lines.home(side, speed)
 
     async def _to(self, stage: str, side: Side, T: Array, speed: float, **options: object) -> None:
-        try:
+        with blaming(stage):
             await self._motion.to({side: T}, speed, **options)  # pyright: ignore[reportArgumentType]
-        except PlanRefused as refusal:
-            raise failed(stage, refusal) from refusal
         await self._context.arms[side].settle(self._tolerance, 1.0)
 
 
-def failed(stage: str, refusal: PlanRefused) -> StageFailed:
-    """Return the failure of `stage` that a refusal is: the arm's where it does not reach, else the planner's."""
-    slot = "upper_body" if refusal.refusal in ARM_BLAMED else "planner"
-    return StageFailed(stage, slot, str(refusal))
+@contextmanager
+def blaming(stage: str) -> Iterator[None]:
+    """Raise a refused plan as the failure of `stage`: the arm's where it does not reach, else the planner's."""
+    try:
+        yield
+    except PlanRefused as refusal:
+        slot = "upper_body" if refusal.refusal in ARM_BLAMED else "planner"
+        raise StageFailed(stage, slot, str(refusal)) from refusal

@@ -48,10 +48,7 @@ class Contents:
 
     def add(self, topic: BagTopic, log_time: int) -> None:
         """Account for one message."""
-        empty = not self.counts
-        self.first = log_time if empty else min(self.first, log_time)
-        self.last = log_time if empty else max(self.last, log_time)
-        self.counts[topic] = self.counts.get(topic, 0) + 1
+        self.merge(Contents(log_time, log_time, {topic: 1}))
 
     def merge(self, other: Contents) -> None:
         """Account for all messages of another file."""
