@@ -163,7 +163,7 @@ def about_z(angle: float) -> Array:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _series(square: float) -> tuple[float, float]:  # pragma: no cover - compiled
+def _series(square: float) -> tuple[float, float]:
     """Return sin(a) / a and (1 - cos(a)) / a^2 of the angle whose square is given [rad^2]."""
     if square < 1e-8:
         return 1.0 - square / 6.0, 0.5 - square / 24.0
@@ -172,7 +172,7 @@ def _series(square: float) -> tuple[float, float]:  # pragma: no cover - compile
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def exp(v: Array) -> Array:  # pragma: no cover - compiled
+def exp(v: Array) -> Array:
     """Return the (3, 3) rotation of a rotation vector (3,) [rad]."""
     s, c = _series(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
     x, y, z = v[0], v[1], v[2]
@@ -184,7 +184,7 @@ def exp(v: Array) -> Array:  # pragma: no cover - compiled
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _skew(v: Array) -> Array:  # pragma: no cover - compiled
+def _skew(v: Array) -> Array:
     out = np.zeros((3, 3))
     out[0, 1], out[0, 2], out[1, 2] = -v[2], v[1], -v[0]
     out[1, 0], out[2, 0], out[2, 1] = v[2], -v[1], v[0]
@@ -192,7 +192,7 @@ def _skew(v: Array) -> Array:  # pragma: no cover - compiled
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def cross(a: Array, b: Array) -> Array:  # pragma: no cover - compiled
+def cross(a: Array, b: Array) -> Array:
     """Return a x b (3,): NumPy's takes twenty times as long."""
     out = np.empty(3)
     for i in range(3):
@@ -202,9 +202,7 @@ def cross(a: Array, b: Array) -> Array:  # pragma: no cover - compiled
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _predict(
-    R: Array, x: Array, P: Array, gyro: Array, acc: Array, dt: float, noise: Array
-) -> None:  # pragma: no cover - compiled
+def _predict(R: Array, x: Array, P: Array, gyro: Array, acc: Array, dt: float, noise: Array) -> None:
     omega, force, half = np.empty(3), np.empty(3), np.empty(3)
     for i in range(3):
         omega[i] = dt * (gyro[i] - x[6 + i])
@@ -253,7 +251,7 @@ def _predict(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _product(A: Array, B: Array) -> Array:  # pragma: no cover - compiled
+def _product(A: Array, B: Array) -> Array:
     """Return the product of two (n, n) matrices, the first mostly zeros."""
     n = len(A)
     out = np.zeros((n, n))
@@ -266,9 +264,7 @@ def _product(A: Array, B: Array) -> Array:  # pragma: no cover - compiled
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def deskew(
-    points: Array, times: Array, t: Array, R: Array, p: Array, v: Array, omega: Array, arm: Array
-) -> Array:  # pragma: no cover - compiled
+def deskew(points: Array, times: Array, t: Array, R: Array, p: Array, v: Array, omega: Array, arm: Array) -> Array:
     """Return points in the frame of the IMU at the last time.
 
     Args:

@@ -61,13 +61,13 @@ class PlaneMap:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _key(x: float, y: float, z: float, size: float) -> int:  # pragma: no cover - compiled
+def _key(x: float, y: float, z: float, size: float) -> int:
     i, j, k = int(math.floor(x / size)), int(math.floor(y / size)), int(math.floor(z / size))
     return ((i + 1048576) << 42) | ((j + 1048576) << 21) | (k + 1048576)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _slot(keys: NDArray[np.int64], key: int) -> int:  # pragma: no cover - compiled
+def _slot(keys: NDArray[np.int64], key: int) -> int:
     """Return where `key` is, or the empty place where it belongs."""
     mask = len(keys) - 1
     h = key * 0x9E3779B97F4A7C1
@@ -78,9 +78,7 @@ def _slot(keys: NDArray[np.int64], key: int) -> int:  # pragma: no cover - compi
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _move(
-    keys: NDArray[np.int64], cells: Array, to_keys: NDArray[np.int64], to_cells: Array
-) -> None:  # pragma: no cover - compiled
+def _move(keys: NDArray[np.int64], cells: Array, to_keys: NDArray[np.int64], to_cells: Array) -> None:
     for level in range(keys.shape[0]):
         for i in range(keys.shape[1]):
             if keys[level, i] != _EMPTY:
@@ -93,7 +91,7 @@ def _move(
 @njit(cache=True, nogil=True, error_model="numpy")
 def _insert(
     points: Array, birth: float, keys: NDArray[np.int64], cells: Array, used: NDArray[np.int64], sizes: Array
-) -> None:  # pragma: no cover - compiled
+) -> None:
     for level in range(len(sizes)):
         size = sizes[level]
         for n in range(len(points)):
@@ -128,7 +126,7 @@ def _insert(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _fit(cell: Array, point: Array, size: float) -> None:  # pragma: no cover - compiled
+def _fit(cell: Array, point: Array, size: float) -> None:
     """Fit the plane of a cell that holds `point`: the eigenvector of the smallest eigenvalue of its covariance."""
     n = cell[_COUNT]
     mx, my, mz = cell[_SUM] / n, cell[_SUM + 1] / n, cell[_SUM + 2] / n
@@ -191,7 +189,7 @@ def accumulate(
     b: Array,
     N: Array,
     told: Array,
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Sum up what the distances of points from their planes say of a pose; see `match`."""
     for out in (A, N):
         for i in range(out.shape[0]):

@@ -113,7 +113,7 @@ def unbalanced(m: Records) -> Fault | None:
 
 
 @njit(cache=True)
-def _sense_at(place: int, numbers: Array, dt: float) -> None:  # pragma: no cover - compiled
+def _sense_at(place: int, numbers: Array, dt: float) -> None:
     """Do `sense_balance` at the address of the memory: to find the type of a record costs more than the sample."""
     n = NUM_JOINTS
     q, dq, tau = numbers[:n], numbers[n : 2 * n], numbers[2 * n : 3 * n]
@@ -130,9 +130,7 @@ def balances(m: Record) -> bool:
 
 
 @njit(cache=True)
-def sense_balance(
-    m: Record, q: Array, dq: Array, tau: Array, quat: Array, gyro: Array, dt: float
-) -> None:  # pragma: no cover - compiled
+def sense_balance(m: Record, q: Array, dq: Array, tau: Array, quat: Array, gyro: Array, dt: float) -> None:
     """Take one sample; `m` is a `BALANCE`, `dt` the time since the one before [s]."""
     T, omega, up, com, feet = np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(3), m.feet
     base_rotation(quat, q[TORSO], 0.0, T)
@@ -191,7 +189,7 @@ def sense_balance(
 
 
 @njit(cache=True)
-def _outside(m: Record, up: Array, height: float) -> float:  # pragma: no cover - compiled
+def _outside(m: Record, up: Array, height: float) -> float:
     """Return how far the capture point is outside the hull of both soles on the level [m], at most 0 inside.
 
     The largest distance along one of `_RAYS` directions; corners of the hull make it too small by under 1 %.
@@ -224,7 +222,7 @@ def _outside(m: Record, up: Array, height: float) -> float:  # pragma: no cover 
 
 
 @njit(cache=True)
-def _leans(rotations: Array, up: Array) -> float:  # pragma: no cover - compiled
+def _leans(rotations: Array, up: Array) -> float:
     """Return the angle between `up` and the mean normal of two soles [rad]; 0 where these are not parallel."""
     apart = square = along = 0.0
     for a in range(3):

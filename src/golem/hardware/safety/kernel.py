@@ -30,9 +30,7 @@ _UPPER = LEGS.stop
 
 
 @njit(cache=True)
-def limited(
-    numbers: Array, table: Array, dt: float, loaded: bool, strained: bool
-) -> Array:  # pragma: no cover - compiled
+def limited(numbers: Array, table: Array, dt: float, loaded: bool, strained: bool) -> Array:
     """Return what `limiter.limit_command` does: q, dq, tau, kp, kd to be sent, then q, kp, kd, tau to be remembered.
 
     Args:
@@ -97,7 +95,7 @@ def limited(
 
 
 @njit(cache=True)
-def rate_state(numbers: Array, table: Array, jump: float, upright: float) -> int:  # pragma: no cover - compiled
+def rate_state(numbers: Array, table: Array, jump: float, upright: float) -> int:
     """Return what is known of a sample: `UNKNOWN`, `STRAINED` or `ORDINARY`.
 
     Args:
@@ -137,9 +135,7 @@ def rate_state(numbers: Array, table: Array, jump: float, upright: float) -> int
 
 
 @njit(cache=True)
-def ordinary_command(
-    numbers: Array, table: Array, one: float, constants: float, all_: float
-) -> bool:  # pragma: no cover - compiled
+def ordinary_command(numbers: Array, table: Array, one: float, constants: float, all_: float) -> bool:
     """Return whether a command, after another, is one that `sender.examine_command` has nothing against.
 
     Args:

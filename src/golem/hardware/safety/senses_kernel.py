@@ -37,7 +37,7 @@ def looked(
     weak_load: float,
     weak_share: float,
     commanded: bool,
-) -> Array:  # pragma: no cover - compiled
+) -> Array:
     """Return what a look changes.
 
     Args:

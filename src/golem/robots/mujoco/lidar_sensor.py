@@ -35,7 +35,7 @@ from golem.types import Array
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def turned(q: Array, rotvec: Array) -> Array:  # pragma: no cover - compiled
+def turned(q: Array, rotvec: Array) -> Array:
     """Return the orientation (4,) after the turn `rotvec` (3,) [rad], which is given in the axes of `q` (4,)."""
     angle = math.sqrt(rotvec[0] ** 2 + rotvec[1] ** 2 + rotvec[2] ** 2)
     scale = 0.5 if angle < 1e-9 else math.sin(0.5 * angle) / angle
@@ -49,7 +49,7 @@ def turned(q: Array, rotvec: Array) -> Array:  # pragma: no cover - compiled
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def turn(p: Array, q: Array) -> Array:  # pragma: no cover - compiled
+def turn(p: Array, q: Array) -> Array:
     """Return the turn (3,) [rad] that takes orientation `p` (4,) to `q` (4,), in the axes of `p`."""
     w = p[0] * q[0] + p[1] * q[1] + p[2] * q[2] + p[3] * q[3]
     v = np.empty(3)
@@ -64,7 +64,7 @@ def turn(p: Array, q: Array) -> Array:  # pragma: no cover - compiled
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def matrix(q: Array) -> Array:  # pragma: no cover - compiled
+def matrix(q: Array) -> Array:
     """Return the (3, 3) rotation of an orientation `q` (4,)."""
     w, x, y, z = q[0], q[1], q[2], q[3]
     R = np.empty((3, 3))
@@ -77,7 +77,7 @@ def matrix(q: Array) -> Array:  # pragma: no cover - compiled
 @njit(cache=True, nogil=True, error_model="numpy")
 def between(
     q0: Array, rate0: Array, v0: Array, q1: Array, rate1: Array, v1: Array, arm: Array, share: float
-) -> tuple[Array, Array]:  # pragma: no cover - compiled
+) -> tuple[Array, Array]:
     """Return the orientation (4,) of a body, and the velocity (3,) of a point of it, between two moments.
 
     `q0`, `rate0` and `v0` are orientation, angular rate in the body's axes [rad/s] and velocity of its origin [m/s] at
@@ -92,7 +92,7 @@ def between(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _point_rate(q: Array, rate: Array, v: Array, arm: Array) -> Array:  # pragma: no cover - compiled
+def _point_rate(q: Array, rate: Array, v: Array, arm: Array) -> Array:
     """Return the velocity (3,) of a point of a body: v + R (rate x arm)."""
     R, out = matrix(q), np.empty(3)
     x, y, z = (
@@ -106,9 +106,7 @@ def _point_rate(q: Array, rate: Array, v: Array, arm: Array) -> Array:  # pragma
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def sensed(
-    q0: Array, v0: Array, q1: Array, v1: Array, mount: Array, gravity: Array, dt: float
-) -> tuple[Array, Array]:  # pragma: no cover - compiled
+def sensed(q0: Array, v0: Array, q1: Array, v1: Array, mount: Array, gravity: Array, dt: float) -> tuple[Array, Array]:
     """Return the mean angular rate [rad/s] and specific force [m/s^2], (3,) each, of an IMU between two moments.
 
     `q0`, `v0` and `q1`, `v1` are orientation of the body and velocity of the IMU at both, `dt` the time between them

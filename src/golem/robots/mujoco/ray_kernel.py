@@ -38,7 +38,7 @@ def cast(
     places: Array,
     frames: Array,
     distance: Array,
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Write the distance along each ray to the first shape into `distance`; `NONE` where there is none.
 
     Args:
@@ -98,7 +98,7 @@ def cast(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def shaken(rays: Array, noise: Array, deviation: float) -> Array:  # pragma: no cover - compiled
+def shaken(rays: Array, noise: Array, deviation: float) -> Array:
     """Return unit directions (n, 3) off by `noise` (n, 3), standard normal, of `deviation` [rad]."""
     out = np.empty(rays.shape)
     for i in range(len(rays)):
@@ -113,7 +113,7 @@ def shaken(rays: Array, noise: Array, deviation: float) -> Array:  # pragma: no 
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def carried(rays: Array, rate: Array, dt: Array, R: Array) -> Array:  # pragma: no cover - compiled
+def carried(rays: Array, rate: Array, dt: Array, R: Array) -> Array:
     """Return directions (n, 3) in the world of a sensor that turns.
 
     Args:
@@ -134,7 +134,7 @@ def carried(rays: Array, rate: Array, dt: Array, R: Array) -> Array:  # pragma: 
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _plane(o: Array, d: Array, size: Array) -> float:  # pragma: no cover - compiled
+def _plane(o: Array, d: Array, size: Array) -> float:
     if d[2] > -_TINY:
         return NONE
     t = -o[2] / d[2]
@@ -145,7 +145,7 @@ def _plane(o: Array, d: Array, size: Array) -> float:  # pragma: no cover - comp
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _box(o: Array, d: Array, size: Array) -> float:  # pragma: no cover - compiled
+def _box(o: Array, d: Array, size: Array) -> float:
     enter, leave = -np.inf, np.inf
     for k in range(3):
         if abs(d[k]) < _TINY:
@@ -160,7 +160,7 @@ def _box(o: Array, d: Array, size: Array) -> float:  # pragma: no cover - compil
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _ball(o: Array, d: Array, z: float, radius: float) -> float:  # pragma: no cover - compiled
+def _ball(o: Array, d: Array, z: float, radius: float) -> float:
     """Return the distance to a ball whose middle is `z` above that of the shape."""
     b = o[0] * d[0] + o[1] * d[1] + (o[2] - z) * d[2]
     c = o[0] * o[0] + o[1] * o[1] + (o[2] - z) * (o[2] - z) - radius * radius
@@ -172,7 +172,7 @@ def _ball(o: Array, d: Array, z: float, radius: float) -> float:  # pragma: no c
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _round(o: Array, d: Array, size: Array, capsule: bool) -> float:  # pragma: no cover - compiled
+def _round(o: Array, d: Array, size: Array, capsule: bool) -> float:
     """Return the distance to a cylinder about z of radius `size[0]` and half length `size[1]`, or to a capsule."""
     radius, half, best = size[0], size[1], np.inf
     a = d[0] * d[0] + d[1] * d[1]
