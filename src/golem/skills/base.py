@@ -105,7 +105,7 @@ class Routine(Protocol, Generic[C, G]):
 
         Raises:
             ConfigError, PlanRefused: this robot cannot pursue this goal, or not now. The result is then `REFUSED`.
-            StageFailed: the result is then of that stage.
+            StageFailed: the result is then of that stage, and the feedback says so.
         """
         ...
 

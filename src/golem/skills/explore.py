@@ -17,7 +17,7 @@ from golem.skills.context import Context
 from golem.skills.kept_file import KeptFileConfig, check_file_name, kept_file
 from golem.skills.navigate import FIRST_MAP
 from golem.skills.pose_goal import FIRST_REPORT, MARGIN, MAX_TIMEOUT, go_to
-from golem.types import PlanarPose, Twist
+from golem.types import PlanarPose
 
 RADIUS = 0.55
 """Distance that the robot keeps from obstacles where it looks at a frontier [m]: half its width and some more."""
@@ -69,14 +69,6 @@ class Explore:
 
     async def run(self, context: Context, goal: ExploreGoal) -> SkillResult:
         """Explore; see `Skill`."""
-        try:
-            return await self._explore(context, goal)
-        except StageFailed as failure:
-            context.legs.drive(Twist())
-            context.say(failure.stage, str(failure), failed=True)
-            return SkillResult(False, failure.stage, failure.slot, str(failure))
-
-    async def _explore(self, context: Context, goal: ExploreGoal) -> SkillResult:
         start, path = context.t, self._file(goal.save) if goal.save else None
         await context.until(lambda: context.legs.reporting, FIRST_REPORT)
         context.legs.check_walking()

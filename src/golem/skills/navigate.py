@@ -10,7 +10,7 @@ from golem.options import require
 from golem.skills.base import SkillResult, StageFailed
 from golem.skills.context import Context
 from golem.skills.pose_goal import FIRST_REPORT, MARGIN, check_numbers, check_reach, go_to
-from golem.types import PlanarPose, Twist
+from golem.types import PlanarPose
 
 FIRST_MAP = 8.0
 """Time that odometry and mapper get to begin [s]: an odometry by LiDAR stands still for a second or two first."""
@@ -54,13 +54,8 @@ class Navigate:
 
     async def run(self, context: Context, goal: NavigateGoal) -> SkillResult:
         """Go to one pose; see `Skill`."""
-        try:
-            target, frame = await self._target(context, goal)
-            return await go_to(context, target, frame, goal.timeout, "navigate", goal.content)
-        except StageFailed as failure:
-            context.legs.drive(Twist())
-            context.say(failure.stage, str(failure), failed=True)
-            return SkillResult(False, failure.stage, failure.slot, str(failure))
+        target, frame = await self._target(context, goal)
+        return await go_to(context, target, frame, goal.timeout, "navigate", goal.content)
 
     async def _target(self, context: Context, goal: NavigateGoal) -> tuple[PlanarPose, Literal["odom", "map"]]:
         """Return the goal, and the frame it is pursued in: the map's where there is a map."""

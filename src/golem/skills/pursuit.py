@@ -68,6 +68,8 @@ async def _pursue(
                 end, late = context.t + CLEANUP, True
                 run.cancel()
         result = run.result
+        if run.failure is not None:
+            context.say(result.stage, result.reason, failed=True)
     finally:
         run.close()
         context.skill = caller

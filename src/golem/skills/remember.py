@@ -54,13 +54,6 @@ class Remember:
 
     async def run(self, context: Context, goal: RememberGoal) -> SkillResult:
         """Look; see `Skill`."""
-        try:
-            return await self._look(context, goal)
-        except StageFailed as failure:
-            context.say(failure.stage, str(failure), failed=True)
-            return SkillResult(False, failure.stage, failure.slot, str(failure))
-
-    async def _look(self, context: Context, goal: RememberGoal) -> SkillResult:
         before = (await memory_status(context)).looks
         context.say("look", f"Looking for {', '.join(goal.labels)}.")
         with context.watch(goal.camera, *goal.labels):

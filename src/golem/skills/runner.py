@@ -20,6 +20,7 @@ class SkillRun:
     Attributes:
         result: how it ended; None while it runs.
         cancelled: whether it was cancelled, however it then ended.
+        failure: what it raised of a stage that failed.
         error: what it raised that no skill should.
     """
 
@@ -29,6 +30,7 @@ class SkillRun:
         self._coroutine = coroutine
         self.result: SkillResult | None = None
         self.cancelled = False
+        self.failure: StageFailed | None = None
         self.error: BaseException | None = None
         if not isinstance(coroutine, Coroutine):
             self.result = self._fault("its 'run' is not an 'async def'")
@@ -72,6 +74,7 @@ class SkillRun:
         except SkillCancelled:
             self.result = SkillResult(False, CANCELLED, None, "The skill was cancelled.")
         except StageFailed as failure:
+            self.failure = failure
             self.result = SkillResult(False, failure.stage, failure.slot, str(failure))
         except (ConfigError, PlanRefused) as refusal:
             self.result = SkillResult(False, REFUSED, None, str(refusal))

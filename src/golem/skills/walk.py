@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from golem.options import require
-from golem.skills.base import SkillResult, StageFailed
+from golem.skills.base import SkillResult
 from golem.skills.context import Context
 from golem.skills.pose_goal import FIRST_REPORT, MARGIN, check_numbers, check_reach, go_to
 from golem.types import PlanarPose, Twist
@@ -49,13 +49,6 @@ class Walk:
 
     async def run(self, context: Context, goal: WalkGoal) -> SkillResult:
         """Walk to one pose; see `Skill`."""
-        try:
-            return await self._pursue(context, goal)
-        except StageFailed as failure:
-            context.say(failure.stage, str(failure), failed=True)
-            return SkillResult(False, failure.stage, failure.slot, str(failure))
-
-    async def _pursue(self, context: Context, goal: WalkGoal) -> SkillResult:
         # Of a robot that was built a moment ago they do so at its first tick.
         await context.until(lambda: context.legs.reporting, FIRST_REPORT)
         target = PlanarPose(goal.x, goal.y, goal.yaw)
