@@ -52,14 +52,12 @@ class PointDatagram:
     Attributes:
         t: device time of the first firing [ns].
         span: time from the first firing to the last [s].
-        firings: how many there were.
         points: (n, 3) float32 in the LiDAR's axes [m].
         offsets: (n,) float32 time of each after the first firing [s], ascending.
     """
 
     t: int
     span: float
-    firings: int
     points: NDArray[np.float32]
     offsets: NDArray[np.float32]
 
@@ -109,7 +107,7 @@ def _points(data: bytes, t: int, span: float, dots: int) -> PointDatagram:
     hit = raw.any(axis=1)
     step = span / (dots - 1) if dots > 1 else 0.0
     offsets = (step * np.flatnonzero(hit)).astype(np.float32)
-    return PointDatagram(t, span, dots, raw[hit].astype(np.float32) * np.float32(1e-3), offsets)
+    return PointDatagram(t, span, raw[hit].astype(np.float32) * np.float32(1e-3), offsets)
 
 
 POINT_PORT, IMU_PORT = 56301, 56401

@@ -183,6 +183,7 @@ class BalanceRecorder:
     """Samples one twin; call it after every tick.
 
     Attributes:
+        due: when the next sample is due [s].
         fallen: whether the robot has fallen.
         margin, yaw: newest CoM margin [m] and heading [rad].
         contact: (2,) whether the feet touched something at the newest sample.
@@ -195,22 +196,17 @@ class BalanceRecorder:
         maximum = None if math.isinf(memory) else round(memory / PERIOD)
         self._rows: deque[tuple[float, ...]] = deque(maxlen=maximum)
         self._polygon: Array = _support(self._truth.soles())
-        self._next = 0.0
+        self.due = 0.0
         self.fallen = False
         self.margin = self.yaw = 0.0
         self.quiet = 0.0
         self.contact: NDArray[np.bool_] = np.zeros(2, dtype=bool)
 
-    @property
-    def due(self) -> float:
-        """When the next sample is due [s]."""
-        return self._next
-
     def __call__(self, t: float, force: Array | None = None) -> None:
         """Sample at time `t` [s], if a sample is due, with the (3,) `force` of the push [N]."""
-        if t < self._next - 1e-9:
+        if t < self.due - 1e-9:
             return
-        self._next = t + PERIOD
+        self.due = t + PERIOD
         base = self._truth.base()
         R, position = base.T_world_base[:3, :3], base.T_world_base[:3, 3]
         forces = self._truth.foot_forces()

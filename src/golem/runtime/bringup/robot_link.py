@@ -47,6 +47,7 @@ class RobotLink:
     """A robot on a domain, seen by one who only listens until told otherwise.
 
     Attributes:
+        node: the one that listens.
         states: the newest ones, oldest first, each with the time by our clock at which it came [s].
         damaged: states that could not be read.
         gate: newest verdict of the safety gate; None before the first.
@@ -56,7 +57,7 @@ class RobotLink:
 
     def __init__(self, participant: CycloneParticipant, node: RosNode, dds: DdsConfig) -> None:
         """Listen through `participant` and `node` on the domain of `dds`."""
-        self._participant, self._node, self._dds = participant, node, dds
+        self._participant, self.node, self._dds = participant, node, dds
         row = public.topic("/lowstate")
         self._reader = participant.reader(names.topic(row.name), dds_name(row.type), Qos(reliable=False, depth=256))
         self.states: deque[tuple[float, LowState]] = deque(maxlen=KEPT)
@@ -70,11 +71,6 @@ class RobotLink:
         self._clock: Publisher | None = None
         status = public.topic("/safety/status")
         node.subscription(status.name, status.type, self._verdict, status.qos)
-
-    @property
-    def node(self) -> RosNode:
-        """The node that listens."""
-        return self._node
 
     @property
     def state(self) -> LowState | None:
@@ -92,7 +88,7 @@ class RobotLink:
         while not until():
             if time.monotonic() >= end:
                 return False
-            self._node.spin_once(PERIOD)
+            self.node.spin_once(PERIOD)
             self._take()
             if self._switcher is not None:
                 self._switcher.poll()
@@ -119,7 +115,7 @@ class RobotLink:
             return
         if self._clock is None:
             row = public.topic("/clock")
-            self._clock = self._node.publisher(row.name, row.type, row.qos)
+            self._clock = self.node.publisher(row.name, row.type, row.qos)
         self._clock.publish(Clock(time_message(state.t)))
 
     def listen(self, seconds: float) -> list[tuple[float, LowState]]:
@@ -143,8 +139,8 @@ class RobotLink:
     def switcher(self) -> MotionSwitcherClient:
         """Return the client that asks which of the robot's own controllers has the motors."""
         if self._switcher is None:
-            endpoints = RoleEndpoints("safety", self._participant, self._node, only=(CALLS,))
-            self._switcher = MotionSwitcherClient.on(endpoints, self._node.now)
+            endpoints = RoleEndpoints("safety", self._participant, self.node, only=(CALLS,))
+            self._switcher = MotionSwitcherClient.on(endpoints, self.node.now)
         return self._switcher
 
     def ask(self, what: str, every: Callable[[], None] | None = None) -> str:
@@ -158,7 +154,7 @@ class RobotLink:
         service = f"/safety/{what}"
         client = self._clients.get(service)
         if client is None:
-            client = self._clients[service] = self._node.client(service, public.TRIGGER)
+            client = self._clients[service] = self.node.client(service, public.TRIGGER)
         if not self.spin(SEARCH, client.ready, every):
             raise RosError(f"Nobody offers '{service}'; start it with: {self._dds.command('safety')}.")
         answer = client.call(Trigger_Request())
@@ -172,7 +168,7 @@ class RobotLink:
         if state is None:
             return
         if self._commands is None:
-            self._commands = RoleEndpoints("stack", self._participant, self._node, only=("/safety/lowcmd_in",))
+            self._commands = RoleEndpoints("stack", self._participant, self.node, only=("/safety/lowcmd_in",))
         zero = np.zeros_like(q)
         command = LowCommand(t=state.t, q=q, dq=zero, tau=zero, kp=kp, kd=kd)
         machine = convert.mode_machine(self.payload)

@@ -59,6 +59,7 @@ class RobotClock:
 
     Attributes:
         t: newest time [s]; -inf before the first.
+        heard: when its newest state came [s]; -inf before the first.
         restarted: whether the state that was judged last is the first of a robot that was restarted.
     """
 
@@ -69,20 +70,14 @@ class RobotClock:
             now: this process's own clock [s].
             writers: tells who writes states; one that was killed is among them for ten seconds more.
         """
-        self.t, self.restarted = -math.inf, False
+        self.t, self.heard, self.restarted = -math.inf, -math.inf, False
         self._now, self._writers = now, writers
         self._writer: int | None = None
-        self._heard = -math.inf
 
     @property
     def known(self) -> bool:
         """Whether a robot has been heard."""
         return self._writer is not None
-
-    @property
-    def heard(self) -> float:
-        """When its newest state came [s]; -inf before the first."""
-        return self._heard
 
     def advances(self, t: float, writer: int) -> bool:
         """Return whether a state with stamp `t` [s] from `writer` is new, and remember it if so.
@@ -91,12 +86,12 @@ class RobotClock:
         that the robot was restarted: one that was lost for long comes back as another.
         """
         known, now = self._writer, self._now()
-        foreign = known is not None and known != writer and now - self._heard < GONE and known in self._writers()
+        foreign = known is not None and known != writer and now - self.heard < GONE and known in self._writers()
         overtaken = writer == known and t >= self.t - BACK
         self.restarted = t < self.t and not overtaken and not foreign
         if foreign or not (self.restarted or t > self.t):
             return False
-        self.t, self._writer, self._heard = t, writer, now
+        self.t, self._writer, self.heard = t, writer, now
         return True
 
 
