@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from golem.hardware.estimator import feet_kernel
-from golem.hardware.estimator.feet_kernel import contact, loads, pressed, wrenches
+from golem.hardware.estimator.feet_kernel import contact, loads, press, wrenches
 from golem.kernels import njit
 from golem.native import Record, Records
 from golem.robots.model.leg_dynamics import leg_tree
@@ -140,10 +140,6 @@ def foot_wrenches(m: Record, motion: Record, tau: Array, dt: float) -> Array:
 
 _HALF: Array = 0.5 * np.array([SOLE.x[1] - SOLE.x[0], SOLE.y[1] - SOLE.y[0]])
 """(2,) half length and half width of a sole [m]."""
-_THICKNESS = 0.01
-"""Height above the other foot from which one may stand on it [m]: half of what it takes. What a foot carries that
-stands on the other one goes to that one, which it pins to the ground: pushed to a side, a robot that walks may cross
-its legs, and the leg of the lower foot then feels no load."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -229,16 +225,10 @@ def sense_feet(m: Record, q: Array, dq: Array, tau: Array, up: Array, omega: Arr
     legs = m.motion
     leg_motion(m.tree, q, dq, gravity, legs)
     wrench = foot_wrenches(m.wrench, legs, tau, dt)
-    force = loads(wrench, up, legs.soles, legs.rotations, m.half, _THICKNESS)
-    m.force[0], m.force[1] = force[0], force[1]
+    loads(m, wrench, up)
     contact(m.force, m.planted, m.age, m.new != 0, m.contacts, dt, m.contact, m.weight)
     m.new = 0
-    local, points, rates = pressed(
-        wrench, m.force, m.weight, omega, legs.soles, legs.rotations, legs.twists, m.half, m.doubts
-    )
-    for k in range(2):
-        for a in range(3):
-            m.local[k, a], m.points[k, a], m.rates[k, a] = local[k, a], points[k, a], rates[k, a]
+    press(m, wrench, omega)
 
 
 FLOOR = np.dtype([("z", "f8"), ("floor", "f8"), ("seen", "i8")])

@@ -12,8 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from golem.kernels import njit
+from golem.native import Record
 from golem.robots.model.linear_kernel import cholesky, solve_cholesky
 from golem.types import Array
+
+_THICKNESS = 0.01
+"""Height above the other foot from which one may stand on it [m]: half of what it takes. What a foot carries that
+stands on the other one goes to that one, which it pins to the ground: pushed to a side, a robot that walks may cross
+its legs, and the leg of the lower foot then feels no load."""
 
 
 @njit(cache=True, nogil=True)
@@ -83,66 +89,44 @@ def contact(
 
 
 @njit(cache=True, nogil=True)
-def loads(wrench: Array, up: Array, soles: Array, rotations: Array, half: Array, thickness: float) -> Array:
-    """Return the (2,) vertical force on each foot [N]; what stands on the other foot is carried by that one.
+def loads(m: Record, wrench: Array, up: Array) -> None:
+    """Write the vertical force on each foot into the `FEET` `m`; what stands on the other foot is carried by that one.
 
     Args:
+        m: of one robot, its legs in motion.
         wrench: (2, 6) of the ground.
         up: (3,) the vertical.
-        soles: (2, 3) their centres [m].
-        rotations: (2, 3, 3) their rotations.
-        half: (2,) half length and half width of a sole [m].
-        thickness: height above the other foot from which one may stand on it [m].
     """
-    force = np.empty(2)
+    force, soles, half = m.force, m.motion.soles, m.half
     for k in range(2):
         force[k] = wrench[k, 0] * up[0] + wrench[k, 1] * up[1] + wrench[k, 2] * up[2]
     u, v, w = soles[0, 0] - soles[1, 0], soles[0, 1] - soles[1, 1], soles[0, 2] - soles[1, 2]
     rise = u * up[0] + v * up[1] + w * up[2]
-    if abs(rise) >= thickness:
+    if abs(rise) >= _THICKNESS:
         lower = 1 if rise > 0.0 else 0
-        R = rotations[lower]
+        R = m.motion.rotations[lower]
         x = u * R[0, 0] + v * R[1, 0] + w * R[2, 0]
         y = u * R[0, 1] + v * R[1, 1] + w * R[2, 1]
         if abs(x) < 2.0 * half[0] and abs(y) < 2.0 * half[1]:
             force[lower] += force[1 - lower]
             force[1 - lower] = 0.0
-    return force
 
 
 @njit(cache=True, nogil=True)
-def pressed(
-    wrench: Array,
-    force: Array,
-    weight: Array,
-    omega: Array,
-    soles: Array,
-    rotations: Array,
-    twists: Array,
-    half: Array,
-    config: Array,
-) -> tuple[Array, Array, Array]:
-    """Say where the feet press on the ground, and how the soles move there; doubt feet that turn or slide.
+def press(m: Record, wrench: Array, omega: Array) -> None:
+    """Write into the `FEET` `m` where the feet press, and how the soles move there; doubt feet that turn or slide.
 
     Args:
+        m: of one robot, with forces and weights; the weights are lessened.
         wrench: (2, 6) of the ground.
-        force: (2,) vertical, of both feet.
-        weight: (2,) how far each foot is believed to stand still; lessened in place.
         omega: (3,) angular rate of base_link [rad/s].
-        soles: (2, 3) their centres [m].
-        rotations: (2, 3, 3) their rotations.
-        twists: (2, 6) of the soles relative to base_link.
-        half: (2,) half length and half width of a sole [m].
-        config: (3,) least force [N], turning [rad/s] and sliding [m/s] of `FeetConfig`.
-
-    Returns:
-        Centre of pressure in the foot and in base_link, velocity of the sole there, (2, 3) each.
     """
-    least, turning, sliding = config[0], config[1], config[2]
-    local, points, rates = np.zeros((2, 3)), np.empty((2, 3)), np.empty((2, 3))
+    least, turning, sliding = m.doubts[0], m.doubts[1], m.doubts[2]
+    local, points, rates, weight, half, twists = m.local, m.points, m.rates, m.weight, m.half, m.motion.twists
     lever = np.empty(3)
     for k in range(2):
-        R, turn = rotations[k], twists[k, 3:]
+        R, turn = m.motion.rotations[k], twists[k, 3:]
+        local[k, 0] = local[k, 1] = local[k, 2] = 0.0
         square = 0.0
         for i in range(3):
             square += ((turn[i] + omega[i]) / turning) ** 2
@@ -157,7 +141,7 @@ def pressed(
             local[k, 1] = min(max(across_x / normal, -half[1]), half[1])
         for i in range(3):
             lever[i] = R[i, 0] * local[k, 0] + R[i, 1] * local[k, 1]
-            points[k, i] = soles[k, i] + lever[i]
+            points[k, i] = m.motion.soles[k, i] + lever[i]
         rates[k, 0] = twists[k, 0] + turn[1] * lever[2] - turn[2] * lever[1]
         rates[k, 1] = twists[k, 1] + turn[2] * lever[0] - turn[0] * lever[2]
         rates[k, 2] = twists[k, 2] + turn[0] * lever[1] - turn[1] * lever[0]
@@ -165,9 +149,8 @@ def pressed(
     u = rates[0, 0] - rates[1, 0] + (omega[1] * z - omega[2] * y)
     v = rates[0, 1] - rates[1, 1] + (omega[2] * x - omega[0] * z)
     w = rates[0, 2] - rates[1, 2] + (omega[0] * y - omega[1] * x)
-    lesser = 1 if force[1] < force[0] else 0
+    lesser = 1 if m.force[1] < m.force[0] else 0
     weight[lesser] /= 1.0 + (u * u + v * v + w * w) / sliding**2
-    return local, points, rates
 
 
 @njit(cache=True, nogil=True)

@@ -19,12 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from golem.finite import finite_state
-from golem.hardware.estimator import invariant_kernel
 from golem.hardware.estimator.attitude import Attitude, base_rotation
 from golem.hardware.estimator.compiled import CompiledEstimator
 from golem.hardware.estimator.feet import FEET, FLOOR, FeetConfig, forget_feet, level_floor, put_feet, sense_feet
 from golem.hardware.estimator.feet_kernel import in_torso
-from golem.hardware.estimator.invariant_kernel import SIZE
+from golem.hardware.estimator.invariant_kernel import SIZE, predict, update
 from golem.kernels import njit
 from golem.native import ORDINARY, UNUSUAL, CompiledStage, Record, Records, new_record, shared, stage_code, view
 from golem.robots.model.imu_mount import TORSO, turn_to_base
@@ -88,22 +87,9 @@ INVARIANT = np.dtype(
         ("numbers", "f8", (6,)),
     ]
 )
-"""State and options of the filter; see `InvariantFilter`."""
-
-
-@njit(cache=True, nogil=True)
-def predict(m: Record, gyro: Array, acc: Array, weight: Array, dt: float) -> None:
-    """Advance the `INVARIANT` `m` by one IMU sample; see `InvariantFilter.predict`."""
-    contact = np.empty(2)
-    for k in range(2):
-        contact[k] = m.contact_noise / max(weight[k], m.numbers[0])
-    invariant_kernel.predict(m.R, m.x, m.bias, m.P, m.noise, m.wander, contact, gyro, acc, dt)
-
-
-@njit(cache=True, nogil=True)
-def update(m: Record, points: Array, weight: Array, shift: Array, heading: float, hanging: bool) -> NDArray[np.bool_]:
-    """Fuse where the feet are seen into the `INVARIANT` `m`; see `InvariantFilter.update`."""
-    return invariant_kernel.update(m.R, m.x, m.bias, m.P, m.planted, points, weight, shift, heading, hanging, m.numbers)
+"""State and options of the filter; see `InvariantFilter`. `noise` are the squared densities of gyro and accelerometer,
+`wander` is the variance that each number of the error gains per second, `contact_noise` that of a contact point.
+`numbers` are the least weight, the variances of a foot, of the heading and of the rest, gate and rejection."""
 
 
 class InvariantFilter:

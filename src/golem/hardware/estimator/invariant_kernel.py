@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from golem.kernels import njit
+from golem.native import Record
 from golem.robots.model.linear_kernel import cholesky, solve_cholesky
 from golem.types import GRAVITY, Array
 
@@ -43,24 +44,12 @@ def _series(x: float, y: float, z: float, square: float, a: float, b: float) -> 
 
 
 @njit(cache=True, nogil=True)
-def predict(
-    R: Array,
-    x: Array,
-    bias: Array,
-    P: Array,
-    noise: Array,
-    wander: Array,
-    contact: Array,
-    gyro: Array,
-    acc: Array,
-    dt: float,
-) -> None:
-    """Advance by one IMU sample.
-
-    `R`, `x`, `bias` and `P` are those of `InvariantFilter`; `gyro`, `acc` and `dt` those of its `predict`. `noise` (2,)
-    are the squared densities of gyro and accelerometer, `wander` (21,) is the variance that each number of the error
-    gains per second, `contact` (2,) that of the left and the right contact point.
-    """
+def predict(m: Record, gyro: Array, acc: Array, weight: Array, dt: float) -> None:
+    """Advance the `INVARIANT` `m` by one IMU sample; see `InvariantFilter.predict`."""
+    R, x, bias, P = m.R, m.x, m.bias, m.P
+    contact = np.empty(2)
+    for k in range(2):
+        contact[k] = m.contact_noise / max(weight[k], m.numbers[0])
     # How errors of gyro (first three columns) and accelerometer enter the invariant error.
     enter = np.zeros((15, 6))
     for j in range(3):
@@ -75,9 +64,9 @@ def predict(
     for i in range(15):
         for j in range(15):
             for k in range(6):
-                P[i, j] += enter[i, k] * noise[k // 3] * dt * enter[j, k]
+                P[i, j] += enter[i, k] * m.noise[k // 3] * dt * enter[j, k]
     for i in range(SIZE):
-        P[i, i] += (contact[(i - 9) // 3] if 9 <= i < 15 else wander[i]) * dt
+        P[i, i] += (contact[(i - 9) // 3] if 9 <= i < 15 else m.wander[i]) * dt
 
     turn, force = np.empty(3), np.empty(3)
     for i in range(3):
@@ -143,24 +132,9 @@ def correct(R: Array, x: Array, bias: Array, delta: Array) -> None:
 
 
 @njit(cache=True, nogil=True)
-def update(
-    R: Array,
-    x: Array,
-    bias: Array,
-    P: Array,
-    planted: NDArray[np.int64],
-    points: Array,
-    weight: Array,
-    shift: Array,
-    heading: float,
-    hanging: bool,
-    config: Array,
-) -> NDArray[np.bool_]:
-    """Fuse where the feet are seen, and the heading.
-
-    The first five are those of `InvariantFilter`, the next five those of its `update`, which returns the same. `config`
-    (6,) has the least weight, the variances of a foot, of the heading and of the rest, gate and rejection.
-    """
+def update(m: Record, points: Array, weight: Array, shift: Array, heading: float, hanging: bool) -> NDArray[np.bool_]:
+    """Fuse where the feet are seen, and the heading, into the `INVARIANT` `m`; see `InvariantFilter.update`."""
+    R, x, P, planted, config = m.R, m.x, m.P, m.planted, m.numbers
     least, foot, course, rest = config[0], config[1], config[2], config[3]
     gate, reject = config[4], config[5]
     seen, off, S = np.empty((2, 3)), np.empty(3), np.empty((10, 10))
@@ -212,7 +186,7 @@ def update(
         solve_cholesky(S, n, gain[i])
         for j in range(n):
             delta[i] -= gain[i, j] * nu[j]
-    correct(R, x, bias, delta)
+    correct(R, x, m.bias, delta)
     for i in range(SIZE):
         for j in range(i + 1):
             for k in range(n):
