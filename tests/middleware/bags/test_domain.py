@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -21,6 +21,7 @@ from golem.middleware.bags.reader import Bag
 from golem.middleware.bags.recorder import GONE, HOLD, MANY, Recorder, clock_time, offered, topic
 from golem.middleware.bags.writer import BagWriter
 from golem.middleware.dds.base import DEFAULT, LATCHED, Participant, Qos, Reader
+from golem.middleware.dds.discovery import Endpoint
 from golem.middleware.dds.local import LocalDomain
 from golem.middleware.ros import codec, names
 from golem.middleware.ros.message import NANO
@@ -313,21 +314,18 @@ def test_public_topics_are_chosen_by_name() -> None:
     assert [t.name for t in public_topics(["/tf", "/tf", "/somebody/elses"])] == ["/tf"]
 
 
-@dataclass
-class Found:
-    topic: str
-    type_name: str
-    qos: Qos
+def found(topic: str, type_name: str, qos: Qos) -> Endpoint:
+    return Endpoint(topic, type_name, qos, bytes(16), bytes(16), "")
 
 
 def test_what_is_found_on_a_domain_is_recorded_as_it_is_offered() -> None:
     writers = [
-        Found("rt/chatter", "std_msgs::msg::dds_::String_", LATCHED),
-        Found("rt/skill/pick/_action/feedback", "golem_interfaces::action::dds_::Pick_FeedbackMessage_", DEFAULT),
-        Found("rt/secret", "their_msgs::msg::dds_::Unknown_", DEFAULT),
-        Found("rt/plain", "Plain", DEFAULT),
-        Found("rq/somethingRequest", "std_srvs::srv::dds_::Trigger_Request_", DEFAULT),
-        Found("ros_discovery_info", "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_", DEFAULT),
+        found("rt/chatter", "std_msgs::msg::dds_::String_", LATCHED),
+        found("rt/skill/pick/_action/feedback", "golem_interfaces::action::dds_::Pick_FeedbackMessage_", DEFAULT),
+        found("rt/secret", "their_msgs::msg::dds_::Unknown_", DEFAULT),
+        found("rt/plain", "Plain", DEFAULT),
+        found("rq/somethingRequest", "std_srvs::srv::dds_::Trigger_Request_", DEFAULT),
+        found("ros_discovery_info", "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_", DEFAULT),
     ]
     chatter, feedback = offered(writers)
     assert chatter == topic("/chatter", "std_msgs/msg/String", LATCHED)
