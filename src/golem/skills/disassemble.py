@@ -9,7 +9,7 @@ from html import escape
 from io import StringIO
 from pathlib import Path
 
-from golem.errors import OutputError
+from golem.errors import ConfigError, OutputError
 from golem.output_file import write_file
 from golem.skills.base import SkillResult, StageFailed
 from golem.skills.context import Context
@@ -112,8 +112,10 @@ class Disassemble:
 
     async def _job(self, context: Context, goal: DisassembleGoal) -> SkillResult:
         """Begin a job or go on with it; however it ends, the inventory is written."""
-        if context.legs.reporting:
-            context.legs.check_walking()
+        if context.legs.reporting and context.legs.status.speed == 0.0:
+            raise ConfigError(
+                f"The legs, '{context.legs.status.controller}', do not walk; choose others, such as almi."
+            )
         listed = read_list(self._folder / goal.list, {*goal.screws, *goal.nuts}) if goal.list else ()
         path = kept_file(str(self._folder), goal.job or f"{goal.list.removesuffix('.csv')}.sqlite", lambda _: None)
         book = await context.think(lambda: JobFile(path, listed), 0.0)
@@ -132,6 +134,7 @@ class Disassemble:
         return result
 
     async def _some(self, context: Context, goal: DisassembleGoal) -> SkillResult:
+        """Go along the pack."""
         start, report, docks = context.t, DisassembleReport(), goal.docks
         if docks:
             docked = await self._dock(context, goal, report)

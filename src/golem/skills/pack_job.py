@@ -131,6 +131,7 @@ class PackJob:
     """
 
     def __init__(self, context: Context, goal: DisassembleGoal, book: JobFile) -> None:
+        """Go on with what `book` has open."""
         self._context, self._goal, self._book = context, goal, book
         self.report, self._gantry = DisassembleReport(), Gantry(context, {one.listed.name for one in book.fasteners})
         self._sides = PackSides(np.array([one.place for one in book.fasteners]))
@@ -167,6 +168,7 @@ class PackJob:
         return self._summary(self._context.t - start)
 
     def _wanted(self, one: PackFastener) -> bool:
+        """Return whether a fastener is to be taken now."""
         said = {"list": one.listed.loose is True, "gantry": one.listed.name in self._gantry.loosened}
         claimed = said.get(self._goal.loosened, True)
         return one.fate in TO_DO and claimed and bool(self._container(one.label))
@@ -185,6 +187,7 @@ class PackJob:
         return at is not None and float(np.linalg.norm(place - at)) < KEEP_OFF
 
     async def _plan(self, todo: list[PackFastener]) -> list[PackStop]:
+        """Return the stops from here, and say them."""
         containers: dict[str, Array] = {}
         for label in set(KINDS.values()):
             places = [(c.x, c.y, c.z) for c in self._book.containers if c.kind == self._container(label)]
@@ -311,6 +314,7 @@ class PackJob:
         return bool((np.linalg.norm(places[:, :2] - self._in_odom(one), axis=1) < WANTED).any())
 
     async def _take(self, one: PackFastener, side: Side) -> PickOutcome:
+        """Try one fastener, and keep what came of it."""
         stance, container = self._T_pack_base, self._container(one.label)
         await self._tell(one, Fate.TRYING, side=side, stance=stance)
         x, y = self._in_odom(one).tolist()
