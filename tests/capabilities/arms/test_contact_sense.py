@@ -3,14 +3,25 @@
 from __future__ import annotations
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from tests.skills.test_force_guard import torques
 
+from golem.capabilities.arms.arm_kinematics import UpperKinematics
+from golem.capabilities.arms.base import ARM_COLUMNS
 from golem.capabilities.arms.hand_force import ContactSense, HandForce
 from golem.capabilities.arms.postures import POSTURES
-from golem.types import SIDES, TICK, Array, Side
+from golem.robots.model.table import DOF
+from golem.types import NUM_JOINTS, SIDES, TICK, UPPER, Array, Imu, LowState, Side
 
-Q, REST = POSTURES["ready"], np.zeros(15)
+Q, REST, LEVEL = POSTURES["ready"], np.zeros(15), np.array([0.0, 0.0, 9.81])
+
+
+def moment(t: float, dq: Array, tau: Array, acc: Array = LEVEL) -> LowState:
+    """Return what motors and IMU report of an upper body at `ready`, speeds and torques (15,)."""
+    q, speeds, efforts = np.zeros((3, NUM_JOINTS))
+    q[UPPER], speeds[UPPER], efforts[UPPER] = Q, dq, tau
+    return LowState(t, q, speeds, efforts, Imu(np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), acc))
 
 
 def felt(sense: ContactSense, side: Side, t: float, seconds: float, force: Array, dq: Array = REST) -> list[float]:
@@ -18,7 +29,7 @@ def felt(sense: ContactSense, side: Side, t: float, seconds: float, force: Array
     rng, found = np.random.default_rng(7), list[float]()
     tau = torques(side, force)
     for k in range(round(seconds / TICK)):
-        if sense.step(t + k * TICK, Q, dq, tau + rng.normal(0.0, 0.15, 15)) and sense.touching:
+        if sense.step(moment(t + k * TICK, dq, tau + rng.normal(0.0, 0.15, 15))) and sense.touching:
             found.append(t + k * TICK)
     return found
 
@@ -40,6 +51,33 @@ def test_an_arm_that_moves_needs_more() -> None:
     assert felt(sense, "left", 1.0, 2.0, np.zeros(3), fast) == []
     assert felt(sense, "left", 3.0, 0.5, np.array((0.0, 0.0, 5.0)), fast) == []
     assert felt(sense, "left", 3.5, 0.5, np.array((0.0, 0.0, 5.0)) + (0.0, 20.0, 0.0), fast) != []
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_a_blow_is_felt_before_a_motor_gives_way(side: Side) -> None:
+    arm, sense, columns = UpperKinematics(), ContactSense(side), ARM_COLUMNS[side]
+    felt(sense, side, 1.0, 2.0, np.zeros(3))
+    arm.update(Q)
+    M = pin.crba(arm.model, arm.data, Q)[columns, columns] + DOF.armature * np.eye(7)
+    blow = np.concatenate([arm.placement(side).rotation.T @ (0.0, 0.0, -10.0), np.zeros(3)])
+    faster = np.linalg.solve(M, arm.jacobian(side)[:, columns].T @ blow)
+    tau, dq, found = torques(side, np.zeros(3)), REST.copy(), list[float]()
+    for k in range(1, 16):
+        dq[columns] = k * TICK * faster
+        if sense.step(moment(3.0 + k * TICK, dq, tau + DOF.damping * dq)) and sense.touching:
+            found.append(k * TICK)
+    assert found and found[0] <= 0.030
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_what_a_torso_that_is_shaken_does_to_its_arms_is_no_touch(side: Side) -> None:
+    arm, sense = UpperKinematics(), ContactSense(side)
+    for k in range(1500):
+        acc = LEVEL + (2.0 * np.sin(0.03 * k), 0.0, 1.0 * np.sin(0.07 * k))
+        arm.model.gravity.linear = -acc
+        tau = pin.computeGeneralizedGravity(arm.model, arm.data, Q)
+        assert not sense.step(moment(1.0 + k * TICK, REST, tau, acc))
+    assert np.linalg.norm(sense.change[:3]) < 0.5
 
 
 def test_a_clock_that_begins_anew_is_no_touch() -> None:

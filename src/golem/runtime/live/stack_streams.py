@@ -244,7 +244,7 @@ def _felt(force: HandForce, side: Side, last: deque[Array], state: LowState) -> 
 def _touched(sense: ContactSense, force: HandForce, side: Side, state: LowState) -> HandContact | None:
     """Return whether something touches a hand, where that has changed, and every `TOLD`."""
     q = state.q[UPPER]
-    changed = sense.step(state.t, q, state.dq[UPPER], state.tau[UPPER])
+    changed = sense.step(state)
     if not changed and round(state.t / TICK) % round(TOLD / TICK):
         return None
     stamped = convert.wrench(state.t, f"{side}_gripper", -sense.change)
