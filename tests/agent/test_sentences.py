@@ -50,7 +50,7 @@ def test_a_thing_is_brought_to_where_another_was() -> None:
     report, calls = said("Put the mug where the bowl was yesterday.")
     assert calls == [
         ("recall", {"text": "bowl", "when": "at", "limit": 20, "ago": 86400.0}),
-        ("fetch", {"text": "mug", "to": [0.5, 0.2]}),
+        ("fetch", {"text": "mug", "to": [0.5, 0.2], "frame": "seen"}),
     ]
     assert report.done
     assert said("move the can where the bowl was 2 hours ago")[1][0][1]["ago"] == 7200.0

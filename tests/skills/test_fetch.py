@@ -87,6 +87,12 @@ def test_it_takes_it_where_it_is_remembered_and_sets_it_down_as_it_was_taken() -
     assert result.value.looked == pytest.approx([0.4, 0.0])
 
 
+def test_a_place_that_was_seen_is_as_far_off_as_what_was_taken() -> None:
+    result, skills = fetch(FetchGoal("mug", (0.5, 0.1), "seen"), [TAKEN])
+    (placed,) = skills["place"].goals
+    assert result.success and (placed.x, placed.y) == pytest.approx((0.5 + 0.75 * 0.01, 0.1 - 0.75 * 0.07))
+
+
 def test_without_a_place_it_stays_in_the_hand() -> None:
     result, skills = fetch(FetchGoal("mug"), [TAKEN])
     assert result.success and "left hand" in result.reason and not skills["place"].goals

@@ -112,7 +112,7 @@ class Body(ABC):
     def in_odom(self, frame: str, x: float, y: float) -> tuple[float, float] | None:
         """Return a place given in a frame, in odom [m]; None where that is not known."""
         base, there = self._bus.latest(topics.BASE), self._bus.latest(topics.MAP_POSE)
-        mapped = frame == "map" or (frame == "memory" and self._bus.latest(topics.MAP) is not None)
+        mapped = frame == "map" or (frame in ("memory", "seen") and self._bus.latest(topics.MAP) is not None)
         if frame == "base_link" or mapped:
             if there is None if mapped else base is None:
                 return None

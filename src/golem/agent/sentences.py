@@ -88,7 +88,7 @@ class SentencePlanner:
         return Spot(best["x"], best["y"], best["z"])
 
     def _fetch(self, thing: str, to: Spot | None) -> ErrandReport:
-        goal = {"text": thing} if to is None else {"text": thing, "to": [to.x, to.y]}
+        goal = {"text": thing} if to is None else {"text": thing, "to": [to.x, to.y], "frame": "seen"}
         said = self._use("fetch", goal)
         return ErrandReport(said["success"], said["reason"]["text"], {} if to is None else {"place": list(to)})
 

@@ -21,7 +21,7 @@ from golem.skills.dock import APPROACH, approach
 from golem.skills.force_guard import PATIENCE, KeptGrip
 from golem.skills.navigate import NavigateGoal
 from golem.skills.pack_view import see_edge
-from golem.skills.place import PlaceGoal
+from golem.skills.place import HANDS, PlaceGoal
 from golem.skills.pose_goal import FIRST_REPORT
 from golem.skills.poses import lifted
 from golem.skills.recall import RecalledPlace, RecalledPlaces, ask
@@ -125,8 +125,9 @@ class FetchGoal:
         text: the thing, in words that localizer and memory know.
         to: x, y where it is set down [m], one after the other; empty: it is brought to where the robot began, in the
             hand.
-        frame: what that is given in: `memory`, the frame of what is remembered (`map`, or `odom` without a map), or
-            `base_link`, where the robot stands when the skill begins.
+        frame: what that is given in: `memory`, the frame of what is remembered (`map`, or `odom` without a map);
+            `seen`, the same of a place that was recalled, as far off as the head camera that saw it; or `base_link`,
+            where the robot stands when the skill begins.
         side: which hand.
         places: how many remembered places are gone to at most.
         search: whether it is searched for where no remembered place has it.
@@ -134,7 +135,7 @@ class FetchGoal:
 
     text: str
     to: tuple[float, ...] = ()
-    frame: Literal["memory", "base_link"] = "memory"
+    frame: Literal["memory", "seen", "base_link"] = "memory"
     side: Literal["left", "right", "either"] = "either"
     places: int = 3
     search: bool = True
@@ -202,7 +203,7 @@ class Fetch:
         if not goal.to:
             return None
         place = PlanarPose(goal.to[0], goal.to[1], 0.0)
-        if goal.frame == "memory":
+        if goal.frame != "base_link":
             return place
         place = home @ place
         return context.T_odom_map.to(place) if context.mapped else place
@@ -353,6 +354,8 @@ class Fetch:
         aside, turned = (taken.aside_x, taken.aside_y), PlanarPose.of(context.legs.pose).yaw - facing
         # What the head camera is off by turns with the robot.
         off = PlanarPose(0.0, 0.0, turned) @ PlanarPose(taken.off_x, taken.off_y, 0.0)
+        if goal.frame == "seen":
+            spot += (1.0 - HANDS) * np.array([off.x, off.y])
         x, y, below, above = float(spot[0]), float(spot[1]), taken.below, taken.above
         there = PlaceGoal(x, y, "odom", side, below, above, aside, (off.x, off.y), taken.radius)
         (await context.run("place", there)).check("skill")
