@@ -83,6 +83,7 @@ def test_it_takes_it_where_it_is_remembered_and_sets_it_down_as_it_was_taken() -
     (taken,), (placed,) = skills["take"].goals, skills["place"].goals
     assert taken.near == pytest.approx((0.4, 0.0)) and taken.label == "mug"
     assert (placed.x, placed.y, placed.side, placed.below, placed.above) == (0.5, 0.1, "left", 0.08, 0.02)
+    assert placed.label == "mug"  # whose picture is to be a new one
     assert placed.off == pytest.approx((0.01, -0.07))  # of a head camera that is off by that much
     assert result.value.looked == pytest.approx([0.4, 0.0])
 

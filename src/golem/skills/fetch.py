@@ -357,7 +357,7 @@ class Fetch:
         if goal.frame == "seen":
             spot += (1.0 - HANDS) * np.array([off.x, off.y])
         x, y, below, above = float(spot[0]), float(spot[1]), taken.below, taken.above
-        there = PlaceGoal(x, y, "odom", side, below, above, aside, (off.x, off.y), taken.radius)
+        there = PlaceGoal(x, y, "odom", side, below, above, aside, (off.x, off.y), taken.radius, goal.text)
         (await context.run("place", there)).check("skill")
         report.x, report.y = float(spot[0]), float(spot[1])
         return f"The {goal.text} was set down at ({spot[0]:.2f}, {spot[1]:.2f}) in odom."

@@ -56,6 +56,8 @@ EDGE = 0.05
 """How far below a surface what is seen is beyond its edge [m]."""
 LYING = 0.6
 """Share of its height below which a thing does not stand."""
+PICTURE = 2.0
+"""Time that the head camera may take for a picture [s]."""
 TILT = 0.4
 """How far what is held may lean on the way [rad]."""
 
@@ -75,6 +77,8 @@ class PlaceGoal:
             between them.
         off: how far from where the head camera has them the hand finds things, in odom, as `take` reports it [m].
         radius: half of its width, as `take` reports it [m]; 0 where it is not known.
+        label: what it is, in words that the localizer knows: the head camera is asked for a picture of it at the end.
+            Without one the newest picture that somebody asked for says whether it stands.
     """
 
     x: float
@@ -86,6 +90,7 @@ class PlaceGoal:
     aside: tuple[float, ...] = ()
     off: tuple[float, ...] = ()
     radius: float = 0.0
+    label: str = ""
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.x) and math.isfinite(self.y)):
@@ -178,6 +183,9 @@ class SetDown:
             await self._carry(context, motion, goal, side, spot)
             await self._lower(context, goal, side, float(spot[2]))
             await self._release(context, motion, side)
+            if goal.label:
+                with context.watch("head", goal.label) as eye:
+                    await eye.look(PICTURE)
             self._stands(context, goal, spot)
         except StageFailed as failure:
             context.say(failure.stage, str(failure), failed=True)
