@@ -46,7 +46,7 @@ class Pose:
     async def run(self, context: Context, goal: object) -> SkillResult:
         """Go there."""
         start, k = context.commanded_joints.copy(), np.linspace(0.0, 1.0, 50)[:, None]
-        await context.follow(0.04 * np.arange(50), start + (3.0 * k**2 - 2.0 * k**3) * (self._q - start))
+        await context.follow(np.linspace(0.0, 1.96, 50), start + (3.0 * k**2 - 2.0 * k**3) * (self._q - start))
         return SkillResult(True, "done", None, "", {})
 
 

@@ -57,7 +57,8 @@ class HandForce:
 
 def _likely(J: Array, rest: Array) -> Array:
     """Return the most likely (6,) wrench behind `rest` (7,), what an arm's motors do beyond its dynamics."""
-    return np.linalg.solve(J @ J.T + np.diag((TORQUE / WRENCH) ** 2), J @ rest)
+    likely = J @ J.T + np.diag((TORQUE / WRENCH) ** 2)
+    return np.asarray(np.linalg.solve(likely, J @ rest), dtype=np.float64)
 
 
 MOMENTUM, QUICK, SLOW = 0.012, 0.006, 0.6
