@@ -43,7 +43,7 @@ class LineOptions(PlantOptions):
 class NavigateLine(LegRung[LineOptions]):
     """Walk 6 m straight ahead over the open floor, by odometry; the error is that of the true pose.
 
-    There is no LiDAR odometry yet: the robot goes by its base estimator, to whose pose a noise of 1 cm and 1 deg is
+    No LiDAR odometry takes part: the robot goes by its base estimator, to whose pose a noise of 1 cm and 1 deg is
     added (`golem.evaluation.episodes.simulated_odometry`, source `estimator`). The drift of legs and IMU over the line
     is in the error.
     """
