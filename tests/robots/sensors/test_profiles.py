@@ -9,7 +9,7 @@ from golem.errors import ConfigError
 from golem.robots.model import pinocchio_model
 from golem.robots.model.table import JOINT_INDEX
 from golem.robots.sensors.cameras import CAMERAS
-from golem.robots.sensors.profiles import PROFILES, EpisodeErrors, load_profile, sample_episode
+from golem.robots.sensors.profiles import GEARS, PROFILES, EpisodeErrors, load_profile, sample_episode
 from golem.robots.sensors.streams import stream
 from golem.robots.worlds.conditions import Conditions
 from golem.types import LEGS, UPPER
@@ -173,9 +173,9 @@ def test_a_file_that_is_no_profile_is_refused(text: str, words: str, tmp_path: P
 def test_conditions_scale_the_palm_the_arms_friction_and_the_backlash_of_a_profile() -> None:
     field = load_profile("field")
     assert field.under(Conditions()) == field
-    other = field.under(Conditions(palm=2.0, arm_friction=0.5, backlash=0.0))
+    other = field.under(Conditions(palm=2.0, arm_friction=0.5, backlash=2.0))
     assert other.palm.rotation == 2.0 * field.palm.rotation
     assert other.palm.translation == (0.002, 0.006)
     assert other.arm_friction == (0.05, 0.4)
-    assert (other.backlash, other.leg_friction) == (0.0, field.leg_friction)
+    assert (field.backlash, other.backlash, other.leg_friction) == (0.0, 2.0 * GEARS, field.leg_friction)
     assert load_profile("ideal").under(Conditions(palm=3.0, arm_friction=3.0)) == load_profile("ideal")

@@ -64,7 +64,8 @@ class Conditions:
         tray_wall: height of the trays [m].
         pitch: of the fasteners along the pack's long side, and so its length, as a share of the nominal one; not of a
             real pack.
-        palm, arm_friction, backlash: of the robot that works there, as shares of what its profile has.
+        palm, arm_friction: of the robot that works there, as shares of what its profile has.
+        backlash: of its gears, as a share of 0.22 deg.
         hand_offset: distance of each hand's mount from where the robot believes it [m]; the seed draws whither.
     """
 
@@ -88,12 +89,14 @@ class Conditions:
     pitch: float = 1.0
     palm: float = 1.0
     arm_friction: float = 1.0
-    backlash: float = 1.0
+    backlash: float = 0.0
     hand_offset: float = 0.0
 
 
-RANGES: dict[str, tuple[float, float]] = {name: tuple(row["range"]) for name, row in _DATA["conditions"].items()}
-"""Ranges of a varied work place; uniform, the light's in its logarithm."""
+RANGES: dict[str, tuple[float, float]] = {
+    name: tuple(row["range"]) for name, row in _DATA["conditions"].items() if "range" in row
+}
+"""Ranges of a varied work place; uniform, the light's in its logarithm. What has none is not drawn."""
 HEIGHTS = dict.fromkeys(("ioniq5", "ioniq5_plant"), (-0.107, 0.203))
 """Range of `height` at a real pack: its rim is 0.75 to 1.06 m over the floor."""
 CHOICES: dict[str, tuple[str, ...]] = {
@@ -151,7 +154,7 @@ def draw_conditions(
         for name in NAMES:
             if name in CHOICES:
                 values[name] = CHOICES[name][int(rng.integers(len(CHOICES[name])))]
-            else:
+            elif name in RANGES:
                 low, high = HEIGHTS[world] if name == "height" and world in HEIGHTS else RANGES[name]
                 logarithmic = name == "light"
                 drawn = rng.uniform(math.log(low), math.log(high)) if logarithmic else rng.uniform(low, high)
