@@ -13,15 +13,7 @@ from golem.errors import ConfigError
 from golem.evaluation.base import TrialSpec
 from golem.evaluation.harness.ladder import LadderConfig, run_ladder
 from golem.evaluation.rungs import base_estimation as walks
-from golem.evaluation.rungs.base_estimation import (
-    BaseEstimation,
-    RecordedWalk,
-    _longest,
-    _way,
-    follow,
-    slipping,
-    wrong_contacts,
-)
+from golem.evaluation.rungs.base_estimation import BaseEstimation, RecordedWalk, _way, follow, slipping, wrong_contacts
 from golem.hardware.estimator.feet import FeetConfig
 from golem.hardware.estimator.random_walk_kf import base_velocity
 from golem.robots.model.leg_dynamics import LegDynamics
@@ -85,9 +77,7 @@ def test_a_foot_that_slips_makes_the_base_seem_a_tenth_faster(gliding: RecordedW
     np.testing.assert_allclose(slipped[:, 1], still[:, 1], atol=1e-9)
 
 
-def test_the_longest_spell_and_the_way() -> None:
-    assert _longest(np.array([0, 1, 1, 0, 1, 1, 1, 0, 1], dtype=bool)) == 3
-    assert _longest(np.zeros(4, dtype=bool)) == 0
+def test_the_way_is_that_of_the_first_heading() -> None:
     T = np.tile(np.eye(4), (3, 1, 1))
     T[0, :3, :3] = rotation_rpy(0.0, 0.0, 1.0)
     T[2, :3, :3] = rotation_rpy(0.0, 0.0, 1.5)
