@@ -120,7 +120,7 @@ FAULTS = {
         ("tests/capabilities/collision/test_scene_cloud.py",),
     ),
     "odometry-begins-moving": PlantedFault(
-        "capabilities/odometry/starts.py",
+        "capabilities/odometry/still_start.py",
         "if moving or np.abs(bias).max() > LARGEST_BIAS:",
         "if np.abs(bias).max() > 10.0 * LARGEST_BIAS:",
         ("tests/capabilities/odometry/test_lio.py",),

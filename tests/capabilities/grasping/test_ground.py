@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from golem.capabilities.grasping.object_cloud import MIN_POINTS, ground_plane, height_above_ground
+from golem.capabilities.grasping.object_cloud import MIN_GROUND, ground_plane, height_above_ground
 from golem.types import Array, Detection, LocalizedObject
 
 TOP = np.array([0.43, -0.14, -0.03])
@@ -56,7 +56,7 @@ def test_a_step_in_the_ground_is_left_out() -> None:
 
 def test_too_few_points_give_no_plane() -> None:
     assert ground_plane(sighting((0.0, 0.0), n=7)) is None
-    assert 7 * 7 < MIN_POINTS
+    assert 7 * 7 < MIN_GROUND
 
 
 def test_a_wall_is_no_ground() -> None:

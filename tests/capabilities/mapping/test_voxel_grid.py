@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from golem.capabilities.mapping.map_file import save_map
-from golem.capabilities.mapping.voxel_grid import GridConfig, VoxelGridMapper
+from golem.capabilities.mapping.voxel_grid import FEWEST_IN_CELL, GridConfig, VoxelGridMapper, WallMeans
 from golem.errors import ConfigError
 from golem.evaluation.conformance.mapper_suite import _near as value_near
 from golem.evaluation.conformance.room import HEIGHT, ROOM, MadeWalk
@@ -118,3 +118,11 @@ def test_the_map_grows_with_what_is_seen() -> None:
     grid = mapper.grid()
     assert grid is not None and grid.cells.shape[1] > before[1]
     assert value_near(grid, float(ROOM[0, 0]), 0.5, 0.2) == 100 and value_near(grid, 1.5, 0.0, 0.0) == 0
+
+
+def test_a_cell_of_a_wall_counts_from_few_points_on() -> None:
+    walls = WallMeans(0.1)
+    walls.add(np.full((FEWEST_IN_CELL - 1, 2), 0.05))
+    assert not len(walls.places())
+    walls.add(np.full((1, 2), 0.09))
+    np.testing.assert_allclose(walls.places(), [[0.06, 0.06]])

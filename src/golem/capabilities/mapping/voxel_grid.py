@@ -122,7 +122,7 @@ class VoxelMap:
         return True
 
 
-FEWEST = 4
+FEWEST_IN_CELL = 4
 """Points in a cell from which on their mean counts."""
 SPAN = 1 << 20
 """Cells along an axis that have numbers of their own; a map is far smaller."""
@@ -150,7 +150,7 @@ class WallMeans:
 
     def places(self) -> Array:
         """Return the (n, 2) means of the cells with enough points [m]."""
-        good = self._sums[self._sums[:, 2] >= FEWEST]
+        good = self._sums[self._sums[:, 2] >= FEWEST_IN_CELL]
         return good[:, :2] / good[:, 2:]
 
 
