@@ -16,7 +16,7 @@ from golem.skills.base import SkillResult, StageFailed
 from golem.skills.context import Context
 from golem.skills.kept_file import KeptFileConfig, check_file_name, kept_file
 from golem.skills.navigate import FIRST_MAP
-from golem.skills.pose_goal import FIRST_REPORT, MARGIN, MAX_TIMEOUT, go_to
+from golem.skills.pose_goal import FIRST_REPORT, MARGIN, MAX_TIMEOUT, go_to, standing_after_failure
 from golem.types import PlanarPose
 
 RADIUS = 0.55
@@ -69,6 +69,10 @@ class Explore:
 
     async def run(self, context: Context, goal: ExploreGoal) -> SkillResult:
         """Explore; see `Skill`."""
+        with standing_after_failure(context):
+            return await self._explore(context, goal)
+
+    async def _explore(self, context: Context, goal: ExploreGoal) -> SkillResult:
         start, path = context.t, self._file(goal.save) if goal.save else None
         await context.until(lambda: context.legs.reporting, FIRST_REPORT)
         context.legs.check_walking()

@@ -9,7 +9,7 @@ from typing import Literal
 from golem.options import require
 from golem.skills.base import SkillResult, StageFailed
 from golem.skills.context import Context
-from golem.skills.pose_goal import FIRST_REPORT, MARGIN, check_numbers, check_reach, go_to
+from golem.skills.pose_goal import FIRST_REPORT, MARGIN, check_numbers, check_reach, go_to, standing_after_failure
 from golem.types import PlanarPose
 
 FIRST_MAP = 8.0
@@ -54,8 +54,9 @@ class Navigate:
 
     async def run(self, context: Context, goal: NavigateGoal) -> SkillResult:
         """Go to one pose; see `Skill`."""
-        target, frame = await self._target(context, goal)
-        return await go_to(context, target, frame, goal.timeout, "navigate", goal.content)
+        with standing_after_failure(context):
+            target, frame = await self._target(context, goal)
+            return await go_to(context, target, frame, goal.timeout, "navigate", goal.content)
 
     async def _target(self, context: Context, goal: NavigateGoal) -> tuple[PlanarPose, Literal["odom", "map"]]:
         """Return the goal, and the frame it is pursued in: the map's where there is a map."""

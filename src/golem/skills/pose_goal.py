@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Literal
 
 from golem.errors import ConfigError
@@ -49,6 +51,16 @@ def check_reach(context: Context, distance: float, timeout: float) -> None:
         raise ConfigError(
             f"It is {distance:.3g} m away; at {speed:.2g} m/s the legs get {reach:.3g} m within {timeout:g} s."
         )
+
+
+@contextmanager
+def standing_after_failure(context: Context) -> Iterator[None]:
+    """Let the robot stand where a stage fails."""
+    try:
+        yield
+    except StageFailed:
+        context.legs.drive(ZERO)
+        raise
 
 
 async def go_to(
