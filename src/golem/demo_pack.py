@@ -32,7 +32,6 @@ class PackFilm:
     period = 1.0 / FPS
 
     def __init__(self) -> None:
-        """Wait for a robot."""
         self._film: Film | None = None
 
     def __call__(self, running: Any, robot: Any) -> None:

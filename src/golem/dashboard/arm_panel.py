@@ -10,10 +10,9 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from golem.capabilities.planning.joint_space import PlanningRobot
-from golem.dashboard.server import WORLD
+from golem.dashboard.server import WORLD, gizmo_pose, place_gizmo
 from golem.robots.model.table import JOINT_NAMES
 from golem.skills.base import SkillResult
 from golem.skills.context import Context
@@ -103,8 +102,7 @@ class ArmPanel:
             if gizmo.visible != self._shown.value:
                 gizmo.visible = self._shown.value
             if side not in self._touched:
-                gizmo.position = palms[side][:3, 3] + self._origin
-                gizmo.wxyz = Rotation.from_matrix(palms[side][:3, :3]).as_quat(scalar_first=True)
+                place_gizmo(gizmo, palms[side], self._origin)
 
     def _turn(self, event: Any) -> None:
         if event.client is not None:  # not by `show`
@@ -113,7 +111,4 @@ class ArmPanel:
 
     def _dragged(self, event: Any, side: Side) -> None:
         """Take a movement of the mouse, in a thread of the server."""
-        T, gizmo = np.eye(4), self._gizmos[side]
-        T[:3, :3] = Rotation.from_quat(np.asarray(gizmo.wxyz), scalar_first=True).as_matrix()
-        T[:3, 3] = np.asarray(gizmo.position) - self._origin
-        self._touched[side], self._turned = T, False
+        self._touched[side], self._turned = gizmo_pose(self._gizmos[side], self._origin), False

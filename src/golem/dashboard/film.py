@@ -246,7 +246,6 @@ class LiveFilm:
     """A film that is begun and ended while the robot is watched; it is written beside the robot, which goes on."""
 
     def __init__(self) -> None:
-        """Start without one."""
         self._film: Film | None = None
         self._said: queue.SimpleQueue[str] = queue.SimpleQueue()
 

@@ -47,7 +47,6 @@ class History:
     """Moments of the last `SPAN` seconds, in order."""
 
     def __init__(self) -> None:
-        """Start empty."""
         self._moments: deque[Snapshot] = deque()
 
     def add(self, moment: Snapshot) -> None:

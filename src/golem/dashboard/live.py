@@ -253,12 +253,13 @@ class LiveView(AbstractContextManager["LiveView", None]):
         if self._recorder.fallen and not self._note:
             self._note = "The robot fell, by the simulator's truth."
         status, shown = read_status(self._running), self._panel.view
-        past = self._history.before(shown.age) if shown.age else None
+        moment = self._history.before(shown.age)
+        assert moment is not None
         with self._server.atomic():
             self._stage.show(
                 t - self._shown,
                 self._timeline.target if self._busy else None,
-                None if past is None else (past.positions, past.orientations),
+                (moment.positions, moment.orientations),
                 follow=shown.follows,
             )
             self._show_push(t)

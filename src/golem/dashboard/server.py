@@ -14,11 +14,12 @@ import logging
 import math
 import socket
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from unittest import mock
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from golem.errors import ConfigError, MissingExtra
 from golem.middleware.web_gate import LOCAL
@@ -161,6 +162,19 @@ class Stage:
             head = self._view.position(body)
             tail = head - force / size * min(ARROW * size, LONGEST)
             self._arrow.points = np.array([[tail, head]], dtype=np.float32)
+
+
+def gizmo_pose(gizmo: Any, origin: Array) -> Array:
+    """Return the (4, 4) pose in odom at which a gizmo stands; `origin` (3,) is odom's in the world that is shown."""
+    T = np.eye(4)
+    T[:3, :3] = Rotation.from_quat(np.asarray(gizmo.wxyz), scalar_first=True).as_matrix()
+    T[:3, 3] = np.asarray(gizmo.position) - origin
+    return T
+
+
+def place_gizmo(gizmo: Any, T: Array, origin: Array) -> None:
+    """Bring a gizmo to the pose `T` (4, 4) in odom; see `gizmo_pose`."""
+    gizmo.position, gizmo.wxyz = T[:3, 3] + origin, Rotation.from_matrix(T[:3, :3]).as_quat(scalar_first=True)
 
 
 def _sky() -> NDArray[np.uint8]:

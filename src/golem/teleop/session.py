@@ -15,11 +15,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 from tyro.conf import OmitArgPrefixes, Positional, arg
 
 from golem.dashboard.live import LiveView
-from golem.dashboard.server import WORLD
+from golem.dashboard.server import WORLD, gizmo_pose, place_gizmo
 from golem.datasets.commands import TASK, PictureOptions
 from golem.datasets.episode_writer import DatasetWriter
 from golem.datasets.sampling import StackRecorder
@@ -135,11 +134,7 @@ class Gizmos:
             self._held.discard(side)
         else:
             self._held.add(side)
-        goal = None
-        if side in self._held:
-            goal, gizmo = np.eye(4), self._gizmos[side]
-            goal[:3, :3] = Rotation.from_quat(np.asarray(gizmo.wxyz), scalar_first=True).as_matrix()
-            goal[:3, 3] = np.asarray(gizmo.position) - self._origin
+        goal = gizmo_pose(self._gizmos[side], self._origin) if side in self._held else None
         self._pilot.drag(f"view {event.client_id}", side, goal, time.monotonic())
 
     def _gone(self, client: str) -> None:
@@ -152,8 +147,7 @@ class Gizmos:
             gizmo, label, why = self._gizmos[side], self._labels[side], self._driving.refused[side]
             T = poses[side]
             if side not in self._held:
-                gizmo.position = T[:3, 3] + self._origin
-                gizmo.wxyz = Rotation.from_matrix(T[:3, :3]).as_quat(scalar_first=True)
+                place_gizmo(gizmo, T, self._origin)
                 gizmo.visible = True
             label.visible = bool(why)
             if why:

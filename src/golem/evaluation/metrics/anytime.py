@@ -118,6 +118,12 @@ def unpaired_evidence(a: ArrayLike, b: ArrayLike) -> Array:
     return np.cumsum(steps[0] + steps[1], axis=-1)
 
 
+def evidence(a: Array, b: Array, paired: bool) -> Array:
+    """Return the logarithm of the e-process against "a and b are equally good"; scores are always taken as pairs."""
+    pairs = paired or not (_is_binary(a) and _is_binary(b))
+    return paired_evidence(a, b) if pairs else unpaired_evidence(a, b)
+
+
 def anytime_p(log_evidence: Array) -> Array:
     """Return the p-values, (..., T), which hold at any time: one over the largest evidence so far."""
     return np.minimum(np.exp(-np.maximum.accumulate(log_evidence, axis=-1)), 1.0)

@@ -19,8 +19,7 @@ from golem.evaluation.metrics.anytime import (
     confidence_sequence,
     difference_interval,
     equal_within,
-    paired_evidence,
-    unpaired_evidence,
+    evidence,
 )
 from golem.evaluation.metrics.statistics import Interval, holm, wilson
 from golem.evaluation.metrics.tables import p_value
@@ -121,12 +120,6 @@ class Decision:
 Pair = tuple[str, str, Array, Array, bool]
 """Names of two sides, what is compared of their trials in the order of the indices they have in common, and whether
 both saw the same scenes."""
-
-
-def evidence(a: Array, b: Array, paired: bool) -> Array:
-    """Return the logarithm of the e-process against "a and b are equally good"; scores are always taken as pairs."""
-    yes_or_no = all(np.isin(side, (0.0, 1.0)).all() for side in (a, b))
-    return paired_evidence(a, b) if paired or not yes_or_no else unpaired_evidence(a, b)
 
 
 def decisions(pairs: Sequence[Pair], rule: StopRule) -> tuple[Decision, ...]:
