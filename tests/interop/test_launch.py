@@ -28,8 +28,8 @@ from golem.middleware.ros.msgs.std_srvs import Trigger_Request, Trigger_Response
 pytestmark = [pytest.mark.slow, pytest.mark.alone, pytest.mark.timeout(1800)]
 
 PICK = "golem_interfaces/action/Pick"
-SILENT = ("/livox/", "/api/", "/objects/", "/onboard/", "/map", "/plan")
-"""Beginnings of the topics that nothing need come on: for some it takes a LiDAR or a goal."""
+SILENT = ("/livox/", "/api/", "/objects/", "/onboard/", "/map", "/plan", "/pack/")
+"""Beginnings of the topics that nothing need come on: for some it takes a LiDAR, a goal or a job by a list."""
 LISTEN = 15.0
 """How long all topics are listened to [s]."""
 
