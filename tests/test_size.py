@@ -6,7 +6,7 @@ from pathlib import Path
 
 from tests.sources import SOURCE
 
-ALL = 106_523
+ALL = 106_485
 """Lines of the package [own: 100,000 is the goal; lower this with every line that goes]."""
 ON_A_ROBOT = 67_359
 """Lines of what a robot runs [own: 62,000 is the goal]."""

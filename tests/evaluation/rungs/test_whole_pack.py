@@ -49,6 +49,19 @@ def test_the_list_has_every_fastener_and_claims_that_are_wrong_as_often_as_asked
     assert 0.04 < off < 0.06
 
 
+def test_the_list_errs_by_as_much_as_asked(tmp_path: Path) -> None:
+    scene: Any = SimpleNamespace(layout=PackLayout(), draws=())
+    lists = []
+    for options in (WholePackOptions(place=0.0), WholePackOptions(place=0.001, kind=0.2)):
+        write_claims(tmp_path / "a.csv", scene, options, np.random.default_rng(0))
+        lists.append([one for one in read_list(tmp_path / "a.csv", {"tray"}) if one.kind != "tray"])
+    right, wrong = lists
+    assert {one.kind for one in right} == {"screw"}
+    assert 0.1 < np.mean([one.kind != "screw" for one in wrong]) < 0.3
+    off = [(a.x - b.x, a.y - b.y, a.z - b.z) for a, b in zip(right, wrong, strict=True)]
+    assert np.std(off) == pytest.approx(0.001, rel=0.15)
+
+
 def test_the_list_of_the_real_pack_has_its_kinds_and_trays(tmp_path: Path) -> None:
     scene: Any = SimpleNamespace(layout=Ioniq5Layout(), draws=())
     write_claims(tmp_path / "a.csv", scene, WholePackOptions(world="ioniq5"), np.random.default_rng(0))

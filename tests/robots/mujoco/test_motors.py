@@ -123,3 +123,22 @@ def test_a_torque_that_turns_crosses_the_backlash_before_the_link_feels_it() -> 
     assert (pushed[: round(0.9 * crossing / 0.0005)] == 0.0).all()
     assert (pushed[round(1.1 * crossing / 0.0005) :] == -1.0).all()
     assert seen[len(seen) // 2 - 1] - seen[-1] == pytest.approx(play)  # the encoder is the motor's
+
+
+def test_the_reported_speed_of_a_rotor_in_its_play_adds_up_to_its_way() -> None:
+    model = robot_spec(hands=False).compile()
+    data, tick = mujoco.MjData(model), 0.002
+    motors = Motors(model, np.full(NUM_JOINTS, 100.0), ZERO, 0.0, backlash=0.004)
+    place = [motors.measure(data)[0]]
+    way = np.zeros(NUM_JOINTS)
+    for k in range(60):
+        motors.give(torque(1.0 if k // 20 % 2 else -1.0), data.time)
+        for _ in range(4):
+            motors.drive(data)
+            data.time += tick / 4
+        q, dq, _ = motors.measure(data)
+        way += dq * tick
+        place.append(q)
+    # The first tick of the drives is a step short.
+    assert np.ptp(place, axis=0)[0] > 0.003
+    np.testing.assert_allclose(way, place[-1] - place[0], atol=2e-4)

@@ -15,7 +15,6 @@ from tests.robots.worlds.test_pack import height
 
 from golem.robots.mujoco.config import MujocoConfig
 from golem.robots.mujoco.scene import nominal_layout
-from golem.robots.worlds.claimed_list import ListErrors, claimed_list
 from golem.robots.worlds.conditions import Conditions, Fasteners, arranged, draw_conditions, draw_fasteners
 from golem.robots.worlds.ioniq5 import RIM, Ioniq5Layout, ioniq5_data
 from golem.robots.worlds.layout import PackLayout
@@ -202,25 +201,3 @@ def test_the_rim_is_as_high_over_the_floor_in_the_hoist_as_standing() -> None:
     assert stands.top_z == RIM
     assert hangs.top_z - RIM == pytest.approx(MujocoConfig().hoist.height - 0.96)
     assert type(nominal_layout(MujocoConfig(), 0.96)) is PackLayout
-
-
-def test_a_gantry_s_list_has_its_errors_and_no_others() -> None:
-    layout, T = Ioniq5Layout(), np.eye(4)
-    truth = (np.column_stack([layout.fasteners(), np.ones(84)]) @ layout.pose().T)[:, :3]
-    right = claimed_list(layout, T, ListErrors(0.0, 0.0, 0.0), np.random.default_rng(0), gone=(3,))
-    assert len(right) == 83 and len({c.name for c in right}) == 83
-    for claim in right:
-        away = np.linalg.norm(truth - claim.position, axis=1)
-        assert away.min() < 1e-12 and layout.kind(int(away.argmin())) == claim.kind
-    wrong = [claimed_list(layout, T, ListErrors(), np.random.default_rng(seed)) for seed in range(20)]
-    again = claimed_list(layout, T, ListErrors(), np.random.default_rng(0))
-    assert [c.name for c in again] == [c.name for c in wrong[0]]
-    assert 84 < np.mean([len(rows) for rows in wrong]) < 96
-    off, classes = [], []
-    for rows in wrong:
-        for claim in rows:
-            away = np.linalg.norm(truth - claim.position, axis=1)
-            off.append(away.min())
-            classes.append(layout.kind(int(away.argmin())) == claim.kind)
-    assert 0.003 < np.median(off) < 0.007 and max(off) < 0.04
-    assert 0.90 < np.mean(classes) < 0.98

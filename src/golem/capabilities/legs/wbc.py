@@ -65,6 +65,7 @@ class WbcConfig:
         engage: time in which feet that were not loaded get their torques [s].
         patience: ticks in a row without a solution for which the last one is kept.
         hands: whether the robot wears the MAGPIE hands.
+        speed_lag: time constant of a low pass on the joints' speeds [s]; rotors jump in the play of their gears.
         rate: ticks per second [Hz].
     """
 
@@ -89,6 +90,7 @@ class WbcConfig:
     engage: float = 1.0
     patience: int = 5
     hands: bool = True
+    speed_lag: float = 0.01
     rate: float = 500.0
 
 
@@ -149,6 +151,7 @@ class Wbc:
         self._solution: Solution | None = None
         self._failures = 0
         self._asked: Array | None = None
+        self._speed: Array | None = None
 
     def reset(self, state: LowState) -> None:
         """Forget everything; the next tick takes posture, height and load of the feet from its measurements."""
@@ -157,6 +160,7 @@ class Wbc:
         self._solution = None
         self._failures = 0
         self._asked = None
+        self._speed = None
 
     def step(self, state: LowState, base: BaseEstimate, motion: LocomotionCommand, dt: float) -> LegCommand:
         """Solve for this tick's torques; see `LowerBody.step`.
@@ -165,12 +169,14 @@ class Wbc:
             StanceError: a measurement is not finite, or there was no solution for too many ticks.
         """
         c, d = self.config, self._dynamics
-        q, dq = state.q[LEGS], state.dq[LEGS]
+        q = state.q[LEGS]
         rate = sensed_base_rate(state)
         if not math.isfinite(sum(float(x.sum()) for x in (state.q, state.dq, rate, base.velocity))):
             raise StanceError("Wbc was given a joint, a rate or a base velocity that is not finite.")
         R = base.T_odom_base[:3, :3]
-        d.update(R, base.velocity, rate, state.q, state.dq)
+        before = state.dq if self._speed is None else self._speed
+        self._speed = speed = before + dt / (c.speed_lag + dt) * (state.dq - before)
+        d.update(R, base.velocity, rate, state.q, speed)
         middle = d.soles.mean(axis=0)
         wish, rest = self._rest_height, self._rest
         if motion.height is not None:
@@ -181,7 +187,7 @@ class Wbc:
             com=self._com_gain * (goal - d.com) - self._com_damping * d.com_velocity,
             turn=c.turn_gain * pin.log3(R.T @ level) - c.turn_damping * rate,
             feet=c.feet_gain * self._creep(level) - c.feet_damping * d.soles_velocity,
-            legs=c.posture_gain * (rest - q) - c.posture_damping * dq,
+            legs=c.posture_gain * (rest - q) - c.posture_damping * speed[LEGS],
         )
         solution = self._program.solve(d, tasks)
         self._failures = self._failures + 1 if solution is None else 0
@@ -189,7 +195,7 @@ class Wbc:
         if self._solution is None or self._failures > c.patience:
             raise StanceError(f"Wbc found no contact forces for {self._failures} ticks in a row.")
         self._asked = goal
-        tau = self._share * (self._solution.torque + self._kd * dq)
+        tau = self._share * (self._solution.torque + self._kd * speed[LEGS])
         return LegCommand(hold.copy(), (1.0 - self._share) * self._kp, self._kd.copy(), tau)
 
     @property

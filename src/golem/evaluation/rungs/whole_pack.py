@@ -24,7 +24,7 @@ from golem.evaluation.rungs.pick_screw import SETTLE
 from golem.evaluation.rungs.var_stand import STILL, VarStandRung
 from golem.robots.mujoco.scene import Scene
 from golem.robots.worlds.conditions import REACH_Y, LayoutKind
-from golem.robots.worlds.layout import PackLayout
+from golem.robots.worlds.layout import KINDS, PackLayout
 from golem.skills.disassemble import JOB, Disassemble
 from golem.skills.disassemble_goal import DisassembleGoal, DisassembleReport
 from golem.skills.job_file import Fate
@@ -69,6 +69,10 @@ class WholePackOptions:
     """whole: the gantry has been all round. edge: along the near edge only."""
     wrong: float = 0.05
     """Share of the fasteners of which the gantry says the wrong thing."""
+    place: float = 0.002
+    """Deviation of a place in the list along each axis [m]."""
+    kind: float = 0.0
+    """Share of the fasteners that the list calls by another class."""
     gantry: bool = False
     """Whether the gantry works beside the robot, a fastener in 20 s, and has not been there before."""
 
@@ -175,11 +179,14 @@ def write_claims(
         x, y, z, _ = np.linalg.inv(layout.pose()) @ (tray.x, tray.y, tray.z, 1.0)
         rows.append(f"tray,{x:.4f},{y:.4f},{z:.4f},,")
     wrong = rng.random(len(layout.fasteners())) < options.wrong
-    for slot, (x, y, z) in enumerate(layout.fasteners().tolist()):
+    listed = layout.fasteners() + options.place * rng.normal(size=layout.fasteners().shape)
+    other = (rng.random(len(listed)) < options.kind) * rng.integers(1, len(KINDS), len(listed))
+    for slot, (x, y, z) in enumerate(listed.tolist()):
         if slot not in layout.empty_holes or slot in loose:
             claimed = (slot in loose) != bool(wrong[slot]) and slot in asked
             claims.append((slot, claimed))
-            rows.append(f"{layout.kind(slot)},{x:.4f},{y:.4f},{z + HEAD:.4f},{int(claimed)},{claim_name(slot)}")
+            kind = KINDS[(KINDS.index(layout.kind(slot)) + other[slot]) % len(KINDS)]
+            rows.append(f"{kind},{x:.4f},{y:.4f},{z + HEAD:.4f},{int(claimed)},{claim_name(slot)}")
     file.write_text("\n".join(["class,x,y,z,loose,name", *rows]), encoding="utf-8")
     return claims
 

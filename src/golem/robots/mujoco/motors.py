@@ -46,6 +46,8 @@ MOTORS = np.dtype(
         ("rotor", "f8", (NUM_JOINTS,)),
         ("ahead", "f8", (2, NUM_JOINTS)),
         ("driven", "f8"),
+        ("reported", "f8", (2, NUM_JOINTS)),
+        ("reported_at", "f8"),
         ("random", "u8"),
     ]
 )
@@ -55,7 +57,7 @@ Waiting commands are a ring: the k-th one given is in slot k modulo `SLOTS`, row
 what the motors add to -kp q - kd dq; q is the true position, the encoders' error is in the target. `noise` is that of
 speed and torque, `random` the state of their generator; see `MotorErrors`. `ahead` is how far a rotor is ahead of its
 link, and how fast; `rotor` its inertia and `play` half of the backlash, all at the joint; `driven` is when the last
-step began.
+step began. `reported` is how far a rotor was ahead at the last report, and its mean speed since the one before.
 """
 _motors_at = view(MOTORS)
 
@@ -65,11 +67,15 @@ def report(m: Record, qpos: int, qvel: int, q: Array, dq: Array, tau: Array) -> 
     """Write what encoders and drives report into `q`, `dq`, `tau` (27,); arrays of the simulation by address."""
     place, speed, step, state = floats(qpos), floats(qvel), m.encoder_step, m.random
     noisy = m.noise[0] + m.noise[1] > 0.0
+    since, m.reported_at = m.driven - m.reported_at, m.driven
     for i in range(NUM_JOINTS):
+        if since > 0.0:  # a drive tells speed by the difference of two places; a rotor in its play rattles
+            m.reported[1, i] = (m.ahead[0, i] - m.reported[0, i]) / since
+            m.reported[0, i] = m.ahead[0, i]
         q[i] = place[m.q[i]] + m.ahead[0, i] + m.offset[i]
         if step > 0.0:
             q[i] = step * round(q[i] / step)
-        dq[i], tau[i] = speed[m.v[i]] + m.ahead[1, i], m.torque_gain[i] * m.tau[i]
+        dq[i], tau[i] = speed[m.v[i]] + m.reported[1, i], m.torque_gain[i] * m.tau[i]
         if noisy:  # two normal numbers by Box and Muller, of two uniform ones by xorshift64*
             state = _shifted(state)
             radius = math.sqrt(-2.0 * math.log(_unit(state)))

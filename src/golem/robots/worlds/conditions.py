@@ -65,7 +65,7 @@ class Conditions:
         pitch: of the fasteners along the pack's long side, and so its length, as a share of the nominal one; not of a
             real pack.
         palm, arm_friction: of the robot that works there, as shares of what its profile has.
-        backlash: of its gears, as a share of 0.22 deg.
+        backlash: of its gears beyond that of its profile, as a share of 0.22 deg.
         hand_offset: distance of each hand's mount from where the robot believes it [m]; the seed draws whither.
     """
 
