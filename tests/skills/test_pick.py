@@ -118,9 +118,14 @@ def test_the_screw_is_let_go_above_the_tray_however_much_the_head_camera_is_off(
     np.testing.assert_allclose(let_go[0], TRAY + (0.0, 0.0, CONFIG.drop_height), atol=1e-9)
 
 
-def test_the_palm_camera_brings_the_hand_further_into_the_tray(full: Any, thing: Any) -> None:
+@pytest.mark.parametrize(
+    ("seen", "goes"), [((0.02, 0.08), (0.01, 0.04)), ((0.0, 0.05), (0.0, 0.0)), ((0.16, 0.13), (0.0, 0.0))]
+)
+def test_a_hand_lets_go_where_both_cameras_say_and_leaves_out_what_is_far_off_or_near(
+    full: Any, thing: Any, seen: tuple[float, float], goes: tuple[float, float]
+) -> None:
     let_go: list[Array] = []
-    tick, middle = full.step, TRAY + (0.02, 0.07, 0.0)
+    tick, middle = full.step, TRAY + (*seen, 0.0)
     full.objects["right_hand"] = lambda: [thing("screw", SCREW, full.t), thing("tray", middle, full.t, 0.15)]
 
     def step() -> None:
@@ -132,7 +137,7 @@ def test_the_palm_camera_brings_the_hand_further_into_the_tray(full: Any, thing:
 
     full.step = step
     assert picked(full).success
-    np.testing.assert_allclose(let_go[0][:2], middle[:2], atol=1e-9)
+    np.testing.assert_allclose(let_go[0][:2], TRAY[:2] + goes, atol=1e-9)
 
 
 def test_the_extraction_is_straight_and_slow(full: Any) -> None:
