@@ -251,6 +251,8 @@ class PackJob:
                 return self._strike(f"No {self._container(one.label)} is seen.", "localizer")
             if outcome is PickOutcome.TRAY_FULL:
                 return None
+            if outcome is PickOutcome.NOTHING_THERE:  # odom drifts while the arms work, so its place may have moved
+                await self._find_again(one.label, self._container(one.label))
         self._strikes = 0
         return None
 

@@ -125,6 +125,18 @@ def test_a_torque_that_turns_crosses_the_backlash_before_the_link_feels_it() -> 
     assert seen[len(seen) // 2 - 1] - seen[-1] == pytest.approx(play)  # the encoder is the motor's
 
 
+def test_a_torque_below_the_friction_of_the_gears_leaves_the_rotor_in_its_play() -> None:
+    model = robot_spec(hands=False).compile()
+    data, motors = mujoco.MjData(model), Motors(model, np.full(NUM_JOINTS, 100.0), ZERO, 0.0, backlash=0.004)
+    motors.resist(model, np.full(NUM_JOINTS, 0.5))
+    for value, moved in ((0.4, False), (0.6, True)):
+        motors.give(torque(value), data.time)
+        for _ in range(200):
+            motors.drive(data)
+            data.time += 0.0005
+        assert (float(motors.measure(data)[0][0]) > 0.0) == moved
+
+
 def test_the_reported_speed_of_a_rotor_in_its_play_adds_up_to_its_way() -> None:
     model = robot_spec(hands=False).compile()
     data, tick = mujoco.MjData(model), 0.002

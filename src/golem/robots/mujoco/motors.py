@@ -44,6 +44,7 @@ MOTORS = np.dtype(
         ("torque_gain", "f8", (NUM_JOINTS,)),
         ("play", "f8"),
         ("rotor", "f8", (NUM_JOINTS,)),
+        ("rubs", "f8", (NUM_JOINTS,)),
         ("ahead", "f8", (2, NUM_JOINTS)),
         ("driven", "f8"),
         ("reported", "f8", (2, NUM_JOINTS)),
@@ -56,8 +57,9 @@ MOTORS = np.dtype(
 Waiting commands are a ring: the k-th one given is in slot k modulo `SLOTS`, rows `constant`, `kp`, `kd`. `constant` is
 what the motors add to -kp q - kd dq; q is the true position, the encoders' error is in the target. `noise` is that of
 speed and torque, `random` the state of their generator; see `MotorErrors`. `ahead` is how far a rotor is ahead of its
-link, and how fast; `rotor` its inertia and `play` half of the backlash, all at the joint; `driven` is when the last
-step began. `reported` is how far a rotor was ahead at the last report, and its mean speed since the one before.
+link, and how fast; `rotor` its inertia, `rubs` its dry friction and `play` half of the backlash, all at the joint;
+`driven` is when the last step began. `reported` is how far a rotor was ahead at the last report, and its mean speed
+since the one before.
 """
 _motors_at = view(MOTORS)
 
@@ -151,10 +153,13 @@ def _pushes(m: Record, i: int, dt: float) -> bool:
     """Move the rotor of joint `i` in its play for `dt` [s]; return whether its torque reaches the link.
 
     It does while the rotor is at that end of the play to which its torque drives it (dead zone with inertia: Nordin and
-    Gutman, Controlling mechanical systems with backlash: a survey, Automatica 38, 2002). Left out: the acceleration of
-    the link in the play, and what the rotor's impact hands over.
+    Gutman, Controlling mechanical systems with backlash: a survey, Automatica 38, 2002). Gears rub on the rotor's side,
+    so a small torque moves nothing. Left out: the acceleration of the link in the play, and what the rotor's impact
+    hands over.
     """
     speed = m.ahead[1, i] + m.tau[i] / m.rotor[i] * dt
+    slower = min(m.rubs[i] / m.rotor[i] * dt, abs(speed))
+    speed -= math.copysign(slower, speed)
     place = m.ahead[0, i] + speed * dt
     touches = abs(place) >= m.play
     m.ahead[0, i] = min(max(place, -m.play), m.play)
@@ -209,12 +214,14 @@ class Motors:
         memory["torque_gain"] = 1.0 + gains + errors.torque_gain * rng.standard_normal(NUM_JOINTS)
         memory["random"] = rng.integers(1, 2**63)
         memory["play"], memory["rotor"] = 0.5 * backlash, np.maximum(model.dof_armature[self._v], LEAST_ROTOR)
+        memory["rubs"] = model.dof_frictionloss[self._v]
         self._numbers = np.empty(COMMAND)
         self.tau: Array = memory["tau"][0]
 
     def resist(self, model: mujoco.MjModel, friction: Array) -> None:
         """Give the joints of `model` their dry `friction` (27,) [N m]; NaN leaves one as it is."""
         model.dof_frictionloss[self._v] = np.where(np.isnan(friction), model.dof_frictionloss[self._v], friction)
+        self.memory["rubs"] = model.dof_frictionloss[self._v]
 
     def place(self, data: mujoco.MjData, q: Array) -> None:
         """Put the joints at their true positions `q` (27,) [rad]."""

@@ -171,7 +171,7 @@ GEARS = 0.003839724354387525
 
 [C] +-0.11 deg were measured at the PULSE115-60, a quasi-direct drive for legged robots (Perez-Diaz et al., Design and
 Experimental Characterisation of a Novel Quasi-Direct Drive Actuator for Highly Dynamic Robotic Applications, 2024).
-[assumption] the H1-2's gears have as much; nobody publishes theirs. `bench` and `field` have it.
+[assumption] the H1-2's gears have as much; nobody publishes theirs. No profile has it: see docs/decisions/twin.md.
 """
 
 PROFILES: dict[str, RealismProfile] = {
