@@ -155,12 +155,8 @@ class Wbc:
 
     def reset(self, state: LowState) -> None:
         """Forget everything; the next tick takes posture, height and load of the feet from its measurements."""
-        self._hold = None
-        self._apart = None
-        self._solution = None
+        self._hold = self._apart = self._solution = self._asked = self._speed = None
         self._failures = 0
-        self._asked = None
-        self._speed = None
 
     def step(self, state: LowState, base: BaseEstimate, motion: LocomotionCommand, dt: float) -> LegCommand:
         """Solve for this tick's torques; see `LowerBody.step`.

@@ -22,6 +22,8 @@ ZERO = Twist()
 
 MAX_COAST = (0.3, 0.3, 0.5)
 """Furthest that a stop may be expected to move the robot ahead, to its left [m] and round [rad] [own]."""
+A_STEP = 0.15
+"""How far legs may come from their place at one step [m] [own]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +43,8 @@ class GoToConfig:
         dwell: for so long [s]: half a period of the gait and more.
         accept, straight: errors after the stop with which it stays [m], [rad].
         widen: factor on these two with every time it started over: a robot that stops no better is not chased for ever.
+        patience: time in motion nearer than 0.15 m from which on these bounds and the two before grow by that factor in
+            a second [s]: legs that only lean at a small twist, and then step farther, never come nearer.
         rest: time without a step over which the pose is averaged, and after which the robot is judged to stand or
             starts over [s].
         settle: time without a step before that, in which other legs take over, the body comes to rest and old poses
@@ -64,6 +68,7 @@ class GoToConfig:
     accept: float = 0.025
     straight: float = 0.03
     widen: float = 1.2
+    patience: float = 5.0
     rest: float = 1.0
     settle: float = 1.5
     march: float = 1.5
@@ -73,7 +78,7 @@ class GoToConfig:
     def __post_init__(self) -> None:
         positive = ("gain", "face", "pulse", "creep", "smoothing", "close", "aligned", "accept", "straight")
         values = {name: getattr(self, name) for name in positive} | {"speed": min(self.speed)}
-        times = {name: getattr(self, name) for name in ("dwell", "rest", "settle", "march")}
+        times = {name: getattr(self, name) for name in ("dwell", "patience", "rest", "settle", "march")}
         require(
             "goto option ",
             *((n, v, 0.0 < v < math.inf, "a positive number") for n, v in values.items()),
@@ -119,6 +124,8 @@ class GoTo:
         left = (here @ self._coast if moving else here).to(self._goal)
         distance, turn = math.hypot(left.x, left.y), abs(left.yaw)
         if self._walking:
+            self._around += dt if distance < A_STEP else 0.0
+            self._slack *= config.widen**dt if self._around > config.patience else 1.0
             steady = not moving or self._moved >= config.march
             near = steady and distance < self._slack * config.close and turn < self._slack * config.aligned
             self._near = self._near + dt if near else 0.0
@@ -140,11 +147,10 @@ class GoTo:
     def _forget(self) -> None:
         self._pose: Array | None = None
         self._velocity: Array = np.zeros(3)
-        self._rested = self._moved = 0.0
+        self._rested = self._moved = self._near = self._around = 0.0
         self._sum: Array = np.zeros(3)
         self._sent_from: PlanarPose | None = None
         self._slack = 1.0
-        self._near = 0.0
         self._walking = True
 
     def _filter(self, pose: PlanarPose, dt: float) -> None:
