@@ -25,8 +25,8 @@ HIGHER = 0.10
 INSIDE = 0.03
 """A hand this near to the container's middle lets go there [m]."""
 FARTHEST = 0.12
-"""What the palm camera sees farther than this from where the head camera did is not that container [m] [own: the head
-camera's error is 46 mm RMS, the palm camera's 62 mm, as its view is cut off]."""
+"""What the palm camera sees farther than this from where the head camera did is not that container [m] [own: see "The
+palm camera looks at the tray" in docs/decisions/arms.md]."""
 SHARES = (1.0, 0.75, 0.5, 0.25)
 """Shares of the way to the middle that are tried."""
 SAME = 0.035

@@ -173,13 +173,13 @@ def write_claims(
     file: Path, scene: Scene, options: WholePackOptions, rng: np.random.Generator
 ) -> list[tuple[int, bool]]:
     """Write the list of a pack as a gantry would; return the place and the claim of each of its fasteners."""
-    layout, loose = scene.layout, {draw.slot for draw in scene.draws}
+    layout, loose, places = scene.layout, {draw.slot for draw in scene.draws}, scene.layout.fasteners()
     rows, claims, asked = list[str](), list[tuple[int, bool]](), asked_for(layout, options)
     for tray in layout.trays():
         x, y, z, _ = np.linalg.inv(layout.pose()) @ (tray.x, tray.y, tray.z, 1.0)
         rows.append(f"tray,{x:.4f},{y:.4f},{z:.4f},,")
-    wrong = rng.random(len(layout.fasteners())) < options.wrong
-    listed = layout.fasteners() + options.place * rng.normal(size=layout.fasteners().shape)
+    wrong = rng.random(len(places)) < options.wrong
+    listed = places + options.place * rng.normal(size=places.shape)
     other = (rng.random(len(listed)) < options.kind) * rng.integers(1, len(KINDS), len(listed))
     for slot, (x, y, z) in enumerate(listed.tolist()):
         if slot not in layout.empty_holes or slot in loose:

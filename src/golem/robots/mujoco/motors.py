@@ -71,7 +71,7 @@ def report(m: Record, qpos: int, qvel: int, q: Array, dq: Array, tau: Array) -> 
     noisy = m.noise[0] + m.noise[1] > 0.0
     since, m.reported_at = m.driven - m.reported_at, m.driven
     for i in range(NUM_JOINTS):
-        if since > 0.0:  # a drive tells speed by the difference of two places; a rotor in its play rattles
+        if m.play > 0.0 and since > 0.0:  # a drive tells speed by the difference of two places
             m.reported[1, i] = (m.ahead[0, i] - m.reported[0, i]) / since
             m.reported[0, i] = m.ahead[0, i]
         q[i] = place[m.q[i]] + m.ahead[0, i] + m.offset[i]
