@@ -1,8 +1,9 @@
-"""Every public method says what it does, or overrides one of the package that does."""
+"""Every public method says what it does, or is one of a class or contract of the package that does."""
 
 from __future__ import annotations
 
 import ast
+import re
 from collections import defaultdict
 
 from tests.sources import SOURCE
@@ -17,6 +18,8 @@ def test_public_methods_say_what_they_do_or_inherit_it() -> None:
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.ClassDef):
                 bases[node.name] |= {name for base in node.bases if (name := _name(base))}
+                # The contracts that it keeps, too.
+                bases[node.name] |= set(re.findall(r"`(?:\w+\.)*(\w+)`", ast.get_docstring(node) or ""))
                 for member in node.body:
                     if isinstance(member, ast.FunctionDef | ast.AsyncFunctionDef):
                         own[node.name][member.name] = ast.get_docstring(member) is not None

@@ -135,6 +135,14 @@ def is_truth(thing: Any) -> bool:
     return isinstance(thing, TRUTH)
 
 
+def _is_gone(thing: Any) -> bool:
+    """Return whether it is a weak proxy of what is no more."""
+    try:
+        return thing.__class__ is None
+    except ReferenceError:
+        return True
+
+
 def reachable(roots: Iterable[tuple[str, Any]], secret: Callable[[Any], bool] = is_truth) -> list[str]:
     """Return the ways from `roots` (name, object) to what is `secret`, each as names of types; empty if none is."""
     namespaces = {id(vars(module)) for module in list(sys.modules.values()) if hasattr(module, "__dict__")}
@@ -143,7 +151,7 @@ def reachable(roots: Iterable[tuple[str, Any]], secret: Callable[[Any], bool] = 
     found: list[str] = []
     while queue:
         way, thing = queue.pop()
-        if id(thing) in seen:
+        if id(thing) in seen or _is_gone(thing):
             continue
         seen[id(thing)] = thing
         if secret(thing):

@@ -124,6 +124,11 @@ def test_slots_implementations_and_their_first_lines_are_listed() -> None:
     assert "Moves the legs to a stance" in listed
 
 
+def test_the_first_line_of_a_module_says_more_than_where_to_read() -> None:
+    lists = (options_text(OptionsConfig(slot)).splitlines() for slot in SLOTS)
+    assert [line for lines in lists for line in lines if "  See `" in line] == []
+
+
 def test_an_implementation_that_cannot_be_loaded_hides_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
     load = registry.load
 

@@ -144,6 +144,13 @@ def test_a_file_without_a_class_is_answered_with_the_form() -> None:
         registry.load("hand", "my.py")
 
 
+def test_a_file_without_its_ending_is_answered_with_the_form(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "my.py").write_text("class Mine: ...")
+    with pytest.raises(ConfigError, match=r"'my' names a file and no class in it; write my\.py:CLASS\."):
+        registry.load("hand", "my")
+
+
 def test_a_wrong_class_of_a_file_is_answered_with_its_classes(user: str) -> None:
     with pytest.raises(ConfigError, match=r"'WithConfg'; valid: .*WithKeywords.* Did you mean 'WithConfig'"):
         registry.create("hand", f"{user}:WithConfg", {})

@@ -97,6 +97,7 @@ def test_a_config_error_is_a_sentence_of_its_own() -> None:
     [
         ("1 / 0", "importing it raised ZeroDivisionError: division by zero (bad.py:1)"),
         ("raise SystemExit(2)", "importing it raised SystemExit: 2 (bad.py:1)"),
+        ("x = 1\ndef f(self:\n", "importing it raised SyntaxError: '(' was never closed (bad.py, line 2)"),
         (
             "class Bad:\n    def __init__(self):\n        self.x = self.y\n",
             "its constructor raised AttributeError: 'Bad' object has no attribute 'y' (bad.py:3)",
@@ -110,6 +111,7 @@ def test_a_file_that_cannot_be_built_is_named_by_its_line(text: str, reason: str
         registry.create("hand", f"{path}:Bad", {})
     assert caught.value.reason == reason
     assert caught.value.trace is not None and str(path) in caught.value.trace
+    assert "src/golem" not in caught.value.trace
 
 
 @pytest.mark.parametrize(

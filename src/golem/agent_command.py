@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import secrets
+import socket
 import sys
 import threading
+from collections.abc import Callable, Iterable
 from contextlib import ExitStack, closing, redirect_stdout, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,8 +17,7 @@ from tyro.conf import OmitArgPrefixes, Positional, arg
 
 from golem.agent.audit import AuditLog
 from golem.agent.body import Body
-from golem.agent.console import HELP, ToolOperator, terminal
-from golem.agent.desk import Desk
+from golem.agent.desk import Call, Desk
 from golem.agent.domain_body import DomainBody
 from golem.agent.mcp_server import modules, serve_http, serve_stdio
 from golem.agent.sentences import SentencePlanner, replay
@@ -25,10 +26,59 @@ from golem.agent.tool_rules import load_rules
 from golem.dashboard.live import LiveView
 from golem.errors import ConfigError
 from golem.middleware.dds.domain import DdsConfig
+from golem.middleware.web_gate import listen
 from golem.run import on_air, shown
 from golem.runtime.live.node_setup import member
 from golem.runtime.lockstep import build
 from golem.stack import load_stack
+
+TERMINAL = Path("/dev/tty")
+HELP = "Answer 'yes NUMBER' or 'no NUMBER'; 'stop' cancels what runs, 'stop motors' has the safety gate stop the robot."
+
+
+class ToolOperator:
+    """Asks and listens."""
+
+    def __init__(self, desk: Desk, tell: Callable[[str], None], show: Callable[[str | None], None]) -> None:
+        """Answer for `desk`; `tell` says a line on the console, `show` a question in the live view."""
+        self._desk, self._tell, self._show = desk, tell, show
+        self._shown: int | None = None
+        desk.on_ask = self._asked
+
+    def _asked(self, text: str | None) -> None:
+        if text is not None:
+            self._tell(f"May it? {text}   {HELP}")
+        self._shown = next(iter(self._desk.asked), None)
+        call = None if self._shown is None else self._desk.asked[self._shown]
+        self._show(None if call is None else f"[{call.number}] {call.tool} {call.fields}"[:400])
+
+    def decide(self, yes: bool) -> None:
+        """Answer the question that the live view shows."""
+        if self._shown is not None:
+            self._desk.decide(self._shown, yes, "the live view")
+
+    def listen(self, lines: Iterable[str]) -> None:
+        """Do what each line says, on a thread of its own."""
+        threading.Thread(target=self._listen, args=(lines,), name="operator", daemon=True).start()
+
+    def _listen(self, lines: Iterable[str]) -> None:
+        for line in lines:
+            word, _, rest = line.strip().partition(" ")
+            if word in ("yes", "no") and rest.strip().isdecimal():
+                self._desk.decide(int(rest), word == "yes", "the console")
+            elif word == "stop":
+                self._desk.submit(Call("operator", "stop", {"motors": rest.strip() == "motors"}))
+            elif word:
+                self._tell(HELP)
+
+
+def terminal() -> Iterable[str]:
+    """Return the lines that an operator types, where stdin is the agent's; none where there is no terminal."""
+    try:
+        return TERMINAL.open(encoding="utf-8", errors="replace")
+    except OSError:
+        print("golem: no terminal to ask the operator on; what has to be asked is denied.", file=sys.stderr)
+        return ()
 
 
 @dataclass(frozen=True)
@@ -81,6 +131,7 @@ def run_mcp(config: McpConfig) -> bool:
     rules, token = load_rules(config.rules), _token(config)
     if config.stack is None and (config.view or config.record is not None):
         raise ConfigError("--view and --record are for a STACK in this process; beside a domain: golem view, record.")
+    listener = listen("127.0.0.1", config.port) if served and config.port is not None else None
     with ExitStack() as ending:
         log = AuditLog(config.audit, bag=str(config.record or ""), stack=config.stack or "", rules=str(config.rules))
         ending.callback(log.close)
@@ -97,15 +148,14 @@ def run_mcp(config: McpConfig) -> bool:
                 show = ending.enter_context(on_air(running, robot, config.record))
                 if config.view:
                     view = ending.enter_context(LiveView(running, shown(running, robot), passive=True))
-            paced = config.paced or config.view
-            body = StackBody(running, robot, paced, None if config.record is None else show)
+            body = StackBody(running, robot, config.paced or config.view, None if config.record is None else show)
         desk = Desk(body, rules, log)
         operator = ToolOperator(desk, _say, (lambda text: None) if view is None else view.panel.ask)
         if view is not None:
             view.decide = operator.decide
         operator.listen(terminal() if served and config.port is None else sys.stdin)
         if served:
-            _serve(desk, config.port, token)
+            _serve(desk, listener, token)
             return True
         return _use(desk, config)
 
@@ -137,15 +187,15 @@ def _token(config: McpConfig) -> str:
     return token
 
 
-def _serve(desk: Desk, port: int | None, token: str) -> None:
+def _serve(desk: Desk, listener: socket.socket | None, token: str) -> None:
     """Serve on a thread, while this one has the robot; what runs when the client has left is cancelled first."""
     left = threading.Event()
-    if port is not None:
-        _say(f"http://127.0.0.1:{port}/mcp   Authorization: Bearer {token}\n{HELP}")
+    if listener is not None:
+        _say(f"http://127.0.0.1:{listener.getsockname()[1]}/mcp   Authorization: Bearer {token}\n{HELP}")
 
     def serve() -> None:
         try:
-            asyncio.run(serve_stdio(desk) if port is None else serve_http(desk, port, token))
+            asyncio.run(serve_stdio(desk) if listener is None else serve_http(desk, listener, token))
         finally:
             left.set()
 

@@ -6,14 +6,14 @@ Only the chosen command is imported: help answers at once, and spawned workers i
 from __future__ import annotations
 
 import importlib
+import json
 import os
 import shutil
 import sys
 import warnings
 from collections.abc import Callable, Collection, Mapping
-from typing import Any, TypeVar
-
-import tyro
+from pathlib import Path
+from typing import Any, TypeVar, cast
 
 from golem.errors import GolemError, ModuleFault, SlowModule, unknown_name
 
@@ -24,6 +24,13 @@ BAD_INPUT = 2
 FAILED = 1
 """Exit code of a command that ran but did not reach its goal."""
 INTERRUPTED = 130
+_TABLES = json.loads(Path(__file__).with_name("commands.json").read_text(encoding="utf-8"))
+BENCHES, DEVICES, MODEL_COMMANDS = (
+    cast("dict[str, tuple[str, str, str]]", _TABLES[name]) for name in ("bench", "drivers", "model")
+)
+"""What is measured on its own, has a driver, is done with a model: its module, its options, and what runs it."""
+TRAINERS: dict[str, str] = _TABLES["train"]
+"""What can be trained, and the module that does it."""
 
 
 def _demo(words: list[str]) -> int:
@@ -103,13 +110,6 @@ def _model(words: list[str]) -> int:
     return _one_of(words, "model", "model command", MODEL_COMMANDS)
 
 
-MODEL_COMMANDS = {
-    "export": ("golem.robots.model.export", "ExportConfig", "run_export"),
-    "spheres": ("golem.capabilities.collision.pack_robot", "SpheresConfig", "run_spheres"),
-}
-"""What is done with a model: its module, its options, and what runs it; so it is for devices."""
-
-
 def _bench(words: list[str]) -> int:
     """Print figures of performance next to their references; `bench arms`, `bench grasp`, ...: those of one part."""
     _prepare_graphics()
@@ -121,16 +121,6 @@ def _bench(words: list[str]) -> int:
 
     run_bench(_parse(BenchConfig, "bench", words))
     return 0
-
-
-BENCHES = {
-    "arms": ("golem.evaluation.speed.arms_bench", "ArmsBenchConfig", "run_arms_bench"),
-    "grasp": ("golem.evaluation.speed.grasp_bench", "GraspBenchConfig", "run_grasp_bench"),
-    "localizer": ("golem.evaluation.speed.localizer_bench", "LocalizerBenchConfig", "run_localizer_bench"),
-    "loop": ("golem.evaluation.speed.loop_bench", "LoopBenchConfig", "run_loop_bench"),
-    "memory": ("golem.evaluation.speed.memory_bench", "MemoryBenchConfig", "run_memory_bench"),
-}
-"""What is measured on its own."""
 
 
 def _train(words: list[str]) -> int:
@@ -147,15 +137,6 @@ def _train(words: list[str]) -> int:
         raise MissingExtra(error.name or "torch", "train") from error
     trainer.main(words[1:])
     return 0
-
-
-TRAINERS = {
-    "act": "golem.training.act.__main__",
-    "detector": "golem.training.detector.__main__",
-    "grasps": "golem.training.grasps.__main__",
-    "legs": "golem.training.legs.__main__",
-}
-"""What can be trained, and the module that does it."""
 
 
 def _record(words: list[str]) -> int:
@@ -181,33 +162,22 @@ def _safety(words: list[str]) -> int:
     from golem.runtime.live import operator
 
     if words[:1] == ["console"]:
-        from golem.runtime.live.operator import run_console
-
-        run_console(_parse(operator.RequestConfig, "safety console", words[1:]))
-        return 0
+        return _exit_code(operator.run_console(_parse(operator.RequestConfig, "safety console", words[1:])))
     if words[:1] == ["take"]:
         return 0 if operator.run_take(_parse(operator.TakeConfig, "safety take", words[1:])) else FAILED
     if words and words[0] in operator.REQUESTS:
         config = _parse(operator.RequestConfig, f"safety {words[0]}", words[1:])
         return 0 if operator.run_request(words[0], config) else FAILED
+    if words and not words[0].startswith("-"):
+        raise unknown_name("request to the safety gate", words[0], ("console", "take", *operator.REQUESTS))
     from golem.runtime.live.safety_main import SafetyConfig, run_safety
 
-    run_safety(_parse(SafetyConfig, "safety", words))
-    return 0
+    return _exit_code(run_safety(_parse(SafetyConfig, "safety", words)))
 
 
 def _drivers(words: list[str]) -> int:
     """Put a device on a domain: `drivers camera`, `hands` and `lidar`; `drivers estop PORT` tries the e-stop board."""
     return _one_of(words, "drivers", "device", DEVICES)
-
-
-DEVICES = {
-    "camera": ("golem.runtime.live.device_process", "CameraConfig", "run_camera"),
-    "estop": ("golem.runtime.estop_check", "EstopCheckConfig", "run_estop_check"),
-    "hands": ("golem.runtime.live.device_process", "HandsConfig", "run_hands"),
-    "lidar": ("golem.runtime.live.device_process", "LidarConfig", "run_lidar"),
-}
-"""What has a driver."""
 
 
 def _skill(words: list[str]) -> int:
@@ -257,65 +227,10 @@ def _command(doc: str, module: str, names: str, graphics: bool = False) -> Calla
     return command
 
 
-# fmt: off
 COMMANDS: dict[str, Callable[[list[str]], int]] = {
-    "demo": _demo,
-    "run": _run,
-    "teleop": _command("Drive a robot by hand in the browser: gizmos, keyboard, gamepad; record demonstrations.",
-                       "golem.teleop.session", "TeleopConfig:run_teleop", True),
-    "options": _command("List what a stack file may set: slots, their implementations, the options of one.",
-                        "golem.option_list", "OptionsConfig:run_options", True),
-    "ladder": _ladder,
-    "faults": _faults,
-    "compare": _command("Compare two ladder runs on the same seeds, e.g. tether with stand.",
-                        "golem.evaluation.metrics.compare", "CompareConfig:run_compare"),
-    "study": _command("Run every ladder of a study file, resumable; --plan its cost, --tables into documents.",
-                      "golem.evaluation.study.study_command", "StudyConfig:run_study_command", True),
-    "publish": _command("Write a static site from studies: leaderboards, methods, every trial, the data.",
-                        "golem.evaluation.report.site", "PublishConfig:run_publish", True),
-    "blame": _blame,
-    "real": _command("Put real trials beside the twin's: which it predicts, and the real success by both.",
-                     "golem.evaluation.real.real_command", "RealConfig:run_real", True),
-    "results": _command("Write the tables of run folders as Markdown, as they stand in the documentation.",
-                        "golem.evaluation.metrics.results", "ResultsConfig:run_results"),
-    "model": _model,
-    "bench": _bench,
-    "reach": _command("Show where the hands can be: table, picture, and the map that skills ask.",
-                      "golem.evaluation.speed.reach_command", "ReachConfig:run_reach"),
-    "train": _train,
-    "dataset": _dataset,
-    "twin": _command("Put the simulated robot on a DDS domain, with the wall clock.",
-                     "golem.runtime.live.process", "TwinConfig:run_twin", True),
-    "safety": _safety,
-    "bringup": _command("Bring a robot up step by step, each one checked; --rehearse: with a twin that has a fault.",
-                        "golem.evaluation.rehearsal.rehearse", "BringupCommandConfig:run_bringup_command"),
-    "calibrate": _command("Calibrate cameras and the arms' encoders by tags on the hands.",
-                          "golem.runtime.calibrate_command", "CalibrateConfig:run_calibrate", True),
-    "identify": _command("Find a robot's masses, friction, delay and encoder zeros from a bag of its motion.",
-                         "golem.evaluation.identification.identify_command", "IdentifyConfig:run_identify"),
-    "drivers": _drivers,
-    "up": _command("Run the modules of a stack file for the robot on a domain.",
-                   "golem.runtime.live.process", "UpConfig:run_up"),
-    "launch": _command("Start twin, safety and up for a stack file, and supervise them.",
-                       "golem.runtime.live.launch", "LaunchConfig:run_launch"),
-    "restart": _command("Restart one process of a launched robot: twin, safety or up.",
-                        "golem.runtime.live.operator", "RestartConfig:run_restart"),
-    "skill": _skill,
-    "mcp": _command("Offer the skills as tools for programs and language models, by the Model Context Protocol.",
-                    "golem.agent_command", "McpConfig:run_mcp", True),
-    "topics": _command("List what is on a domain, with rates and bytes.",
-                       "golem.runtime.live.topic_stats", "TopicStatsConfig:run_topic_stats"),
-    "record": _record,
-    "replay": _command("Play a bag onto a domain.", "golem.runtime.live.record_commands", "ReplayBagConfig:run_replay"),
-    "black-box": _command("Show a stop of the safety gate at the moment of the fault.",
-                          "golem.dashboard.stop_view", "StopViewConfig:run_stop_view"),
-    "view": _command("Show a domain live in Foxglove.", "golem.runtime.live.foxglove_view", "ViewConfig:run_view"),
-    "check": _check,
-    "new": _command("Write a module for a slot, its test and a stack with it: `new SLOT NAME`.",
-                    "golem.evaluation.conformance.new_module", "NewConfig:run_new"),
-    "doctor": _doctor,
+    name: globals()[f"_{name}"] if row is None else _command(**row) for name, row in _TABLES["commands"].items()
 }
-# fmt: on
+"""Every command, in the order of the help; what does more than `_command`'s is a function of this module."""
 
 
 def main() -> None:
@@ -390,6 +305,8 @@ def _exit_code(done: object) -> int:
 
 
 def _parse(kind: type[T], name: str, words: list[str]) -> T:
+    import tyro  # takes half a second, in which Ctrl-C has no `main` to end in
+
     return tyro.cli(kind, prog=f"golem {name}", args=words)
 
 

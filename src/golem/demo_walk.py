@@ -11,7 +11,7 @@ from pathlib import Path
 from golem.dashboard.film import Film
 from golem.dashboard.live import LiveView
 from golem.demo import DemoConfig, prepare
-from golem.evaluation.episodes.contacts import ContactWatch
+from golem.evaluation.episodes.oracle import ContactWatch
 from golem.output_file import write_file
 from golem.robots.mujoco.balance import BalanceRecorder
 from golem.robots.mujoco.engine import MujocoRobot

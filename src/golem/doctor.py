@@ -71,8 +71,6 @@ class Diagnosis:
     """One row of the table.
 
     Attributes:
-        name: what was looked at.
-        found: what was there.
         fix: the line to type, or what to do, when it does not suffice; empty when it does.
         needed: False where GOLEM runs without it.
     """
@@ -213,11 +211,7 @@ def diagnose() -> list[Diagnosis]:
 
 
 def run(console: Console | None = None) -> int:
-    """Print the table.
-
-    Returns:
-        The exit code: 0 when GOLEM can run here, 2 when something needed is missing.
-    """
+    """Print the table; return the exit code: 0 when GOLEM can run here, 2 when something needed is missing."""
     checks = diagnose()
     table = Table("", "what", "found", "to do")
     for check in checks:

@@ -35,6 +35,21 @@ class MissingExtra(GolemError):
         )
 
 
+class needs:  # noqa: N801 - it is read as a word
+    """Around the import of what an extra brings: `with needs("rosbags", "dds"):` raises MissingExtra without it."""
+
+    def __init__(self, package: str, extra: str) -> None:
+        """Name the `package`, or nothing for the module that is absent, and the `extra` that brings it."""
+        self._package, self._extra = package, extra
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        if isinstance(error, ImportError):
+            raise MissingExtra(self._package or error.name or str(error), self._extra) from error
+
+
 class MissingEnvironment(MissingExtra):
     """An environment of its own, in which an optional dependency is installed, is absent."""
 
@@ -74,7 +89,6 @@ class ModuleFault(GolemError):
         """Return the fault of the module (`slot`, `use`) that raised `error`, which was just caught.
 
         Args:
-            slot: its slot.
             use: its name in the stack file.
             error: what was raised. A `ConfigError` is about what the user wrote elsewhere, `ServiceUnavailable` about
                 another machine; they get no trace.

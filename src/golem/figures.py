@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from golem.errors import MissingExtra
+from golem.errors import needs
 
 DPI = 96.0
 """Pixels per inch: matplotlib's points are then three quarters of a pixel."""
@@ -24,10 +24,8 @@ def blank_figure(width: float, height: float, **options: Any) -> Any:
     Raises:
         MissingExtra: matplotlib is not installed.
     """
-    try:
+    with needs("matplotlib", "report"):
         from matplotlib.figure import Figure
-    except ImportError as error:
-        raise MissingExtra("matplotlib", "report") from error
     return Figure(figsize=(width / DPI, height / DPI), dpi=DPI, **{"layout": "constrained", **options})
 
 

@@ -17,22 +17,14 @@ class NotFinite(GolemError):
 
 
 def check_finite(name: str, values: Array) -> None:
-    """Refuse `values`, called `name`, unless all are finite.
-
-    Raises:
-        NotFinite: one is not.
-    """
+    """Refuse `values`, called `name`, unless all are finite. Raises NotFinite: one is not."""
     # A product with itself costs a third of isfinite and all, and is finite unless something is not (or is huge).
     if not math.isfinite(np.vdot(values, values)) and not np.isfinite(values).all():
         raise NotFinite(f"{name} holds NaN or infinity.")
 
 
 def check_measured(state: LowState) -> None:
-    """Refuse a `state` whose joints or IMU report what is not finite.
-
-    Raises:
-        NotFinite: they do; names which.
-    """
+    """Refuse a `state` whose joints or IMU report what is not finite. Raises NotFinite: they do; names which."""
     imu = state.imu
     check_finite("q", state.q)
     check_finite("dq", state.dq)

@@ -11,10 +11,13 @@ import functools
 import hashlib
 import importlib.metadata
 import re
+import signal
+import threading
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from numba import cfunc, config, njit
+from numba.core import event
 from numba.core.caching import InTreeCacheLocator, UserProvidedCacheLocator, UserWideCacheLocator
 
 __all__ = ["cfunc", "njit", "sources", "stamp", "stamp_of_all"]
@@ -100,6 +103,28 @@ class UserWide(_Stamped, UserWideCacheLocator):
     """Compiled code in the user's cache, where the folder of the source cannot be written."""
 
 
+class _Held(event.Listener):
+    """Holds Ctrl-C back while the main thread compiles: what is raised in a callback of LLVM's is lost."""
+
+    depth = 0
+
+    def on_start(self, event: event.Event) -> None:
+        if threading.current_thread() is threading.main_thread():
+            self.depth += 1
+            if self.depth == 1:
+                self.heard = list[int]()
+                self.before = signal.signal(signal.SIGINT, lambda number, _: self.heard.append(number))
+
+    def on_end(self, event: event.Event) -> None:
+        if threading.current_thread() is threading.main_thread() and self.depth:
+            self.depth -= 1
+            if not self.depth:
+                signal.signal(signal.SIGINT, self.before)
+                for number in self.heard[:1]:
+                    signal.raise_signal(number)
+
+
+event.register("numba:compiler_lock", _Held())
 _LOCATORS = [*(f"{__name__}.{kind.__name__}" for kind in (Provided, InTree, UserWide)), "IPythonCacheLocator"]
 _config: Any = config  # numba makes its options at run time
 _config.CACHE_LOCATOR_CLASSES = _config.CACHE_LOCATOR_CLASSES or ",".join(_LOCATORS)

@@ -114,12 +114,7 @@ def stage_code(stage: Callable[[int, int], int]) -> Callable[[], Any]:
 
 @dataclass(frozen=True)
 class CompiledStage:
-    """The compiled part of a module.
-
-    Attributes:
-        code: the compiled function; see `STAGE`.
-        memory: what it remembers.
-    """
+    """The compiled part of a module: `code` is the compiled function, see `STAGE`."""
 
     code: Any
     memory: Records

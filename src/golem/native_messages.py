@@ -14,8 +14,7 @@ _QUAT, _GYRO, _ACC = 3 * _N, 3 * _N + 4, 3 * _N + 7
 def state_of(numbers: Array, t: float) -> LowState:
     """Return the state of time `t` [s] that a copy of `numbers` (91,) holds; see `native.RECORD`."""
     x = numbers.copy()
-    imu = Imu(x[_QUAT:_GYRO], x[_GYRO:_ACC], x[_ACC:STATE])
-    return LowState(t, x[:_N], x[_N : 2 * _N], x[2 * _N : _QUAT], imu)
+    return LowState(t, x[:_N], x[_N : 2 * _N], x[2 * _N : _QUAT], Imu(x[_QUAT:_GYRO], x[_GYRO:_ACC], x[_ACC:STATE]))
 
 
 def put_state(record: Records, state: LowState) -> None:

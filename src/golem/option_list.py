@@ -39,14 +39,7 @@ class OptionsConfig:
 
 @dataclass(frozen=True, slots=True)
 class Option:
-    """One option.
-
-    Attributes:
-        name: as the stack file has it; dots lead into a mapping.
-        kind: its type.
-        default: its default; `REQUIRED` where it has none.
-        text: what it is.
-    """
+    """One option: its `name` in the stack file, dots leading into mappings, and its default, or `REQUIRED`."""
 
     name: str
     kind: str
@@ -60,12 +53,7 @@ def run_options(config: OptionsConfig) -> None:
 
 
 def options_text(config: OptionsConfig) -> str:
-    """Return the list.
-
-    Raises:
-        ConfigError: there is no such slot or implementation.
-        ModuleFault: importing the implementation raised.
-    """
+    """Return the list. Raises ConfigError: there is no such slot or implementation; ModuleFault: its import raised."""
     if config.slot is None:
         return _everything()
     name = registry.SKILL if config.slot == SKILLS else config.slot

@@ -34,7 +34,6 @@ def fill(what: str, config: type[Any], options: Mapping[str, object]) -> Any:
 
     Args:
         what: what the options are to the user, e.g. `"option of upper_body: diff_ik"`.
-        config: the dataclass.
         options: values by field name.
 
     Raises:

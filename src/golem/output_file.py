@@ -10,12 +10,8 @@ from golem.errors import OutputError
 
 
 def write_file(path: Path, text: str) -> Path:
-    """Write a file and the folder it is in, whole or not at all, and return its path.
-
-    Raises:
-        OutputError: it cannot be written.
-    """
-    part = path.with_name(path.name + ".part")
+    """Write a file, and its folder, whole or not at all; return its path. Raises OutputError: it cannot be written."""
+    part = Path(f"{path}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         part.write_text(text, encoding="utf-8")

@@ -159,11 +159,7 @@ class Unchanged:
         self._stamp = self._now()
 
     def check(self, out: Path) -> None:
-        """Refuse to add another result to `out` once the code has changed.
-
-        Raises:
-            OutputError: it has.
-        """
+        """Refuse to add another result to `out` once the code has changed. Raises OutputError: it has."""
         if self._now() != self._stamp:
             raise OutputError(
                 f"The code of golem changed while this ran; {out} holds results of the old one, choose another --out."

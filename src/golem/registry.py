@@ -44,11 +44,7 @@ def contract(slot: str) -> type[Any]:
 
 
 def requires(slot: str, use: str) -> tuple[str, ...]:
-    """Return what the implementation `use` of `slot` says it cannot do without; see `golem.stack.Stack.check`.
-
-    Raises:
-        ConfigError, ModuleFault: see `load`.
-    """
+    """Return what `use` of `slot` cannot do without; see `golem.stack.Stack.check`. Raises as `load` does."""
     return tuple(getattr(load(slot, use), "requires", ()))
 
 
@@ -61,8 +57,8 @@ def load(slot: str, use: str) -> type[Any]:
     """
     location, colon, class_name = _target(slot, use).rpartition(":")
     if not colon:
-        if use.endswith(".py"):
-            raise ConfigError(f"'{use}' names a file and no class in it; write {use}:CLASS.")
+        if use.endswith(".py") or Path(f"{use}.py").is_file():
+            raise ConfigError(f"'{use}' names a file and no class in it; write {use.removesuffix('.py')}.py:CLASS.")
         raise unknown_name(f"{slot} implementation", use, names(slot))
     module = _import(slot, use, location)
     cls = getattr(module, class_name, None)
@@ -148,22 +144,14 @@ def _blamed(slot: str, use: str) -> Generator[None, None, None]:
 
 
 def configure(slot: str, use: str, options: Mapping[str, object]) -> Any:
-    """Return the config dataclass of the implementation `use` of `slot`, with `options`; None if it has none.
-
-    Raises:
-        ConfigError, ModuleFault: see `create`.
-    """
+    """Return the config dataclass of `use` of `slot`, with `options`, None if it has none. Raises as `create` does."""
     use, options = resolve(slot, use, options)
     config = config_class(load(slot, use))
     return None if config is None else fill(_option(slot, use), config, options)
 
 
 def part(name: str, options: Mapping[str, object]) -> Any:
-    """Return the config dataclass of the part `name` (see `golem.slots.PARTS`) with `options`.
-
-    Raises:
-        ConfigError: an option does not exist or has the wrong type.
-    """
+    """Return the config of the part `name` of `golem.slots.PARTS`. Raises ConfigError: an option is wrong."""
     return fill(f"option of {name}", part_class(name), options)
 
 
@@ -189,11 +177,7 @@ def _attribute(target: str) -> type[Any]:
 
 
 def _target(slot: str, use: str) -> str:
-    """Return the `module:Class` that the name `use` stands for; what is no registered name, as it is.
-
-    Raises:
-        ConfigError: two packages register it.
-    """
+    """Return the `module:Class` that `use` stands for, or `use`. Raises ConfigError: two packages register it."""
     shipped = SLOTS[slot].shipped
     use = SLOTS[slot].files.get(Path(use).suffix, use)
     owners = [(PACKAGE, shipped[use])] if use in shipped else []
@@ -230,7 +214,7 @@ def _import(slot: str, use: str, location: str) -> ModuleType:
     except ModuleNotFoundError as error:
         if error.name is not None and (location == error.name or location.startswith(error.name + ".")):
             raise ConfigError(
-                f"{slot}: '{use}' names the module {location}, which cannot be found; "
+                f"{slot}: '{use}' names the module {location}, which cannot be found (a file: FILE.py:CLASS); "
                 f"registered names: {', '.join(names(slot))}."
             ) from error
         raise ModuleFault(slot, use, f"it needs the package '{error.name}', which is not installed") from error

@@ -170,11 +170,7 @@ def _operate(config: RunConfig, stack: Stack) -> SkillResult:
 
 
 def show_trial(config: LadderConfig) -> TrialOutcome:
-    """Run one trial of a ladder in the live view, paced by the wall clock, and say how it ended.
-
-    Raises:
-        ConfigError: an option is wrong, or there is no such trial.
-    """
+    """Run one trial of a ladder in the live view, and say how it ended. Raises ConfigError: a wrong option or trial."""
     config = config.whole()
     request, _ = prepare(config)
     spec, record = find_trial(config, request)
@@ -220,11 +216,7 @@ def on_air(
 
 
 def shown(running: LockstepRunner, robot: object) -> MujocoRobot:
-    """Return the `robot` of a stack as the twin, which is what a viewer shows.
-
-    Raises:
-        ConfigError: it is none.
-    """
+    """Return the `robot` of a stack as the twin, which is what a viewer shows. Raises ConfigError: it is none."""
     if not isinstance(robot, MujocoRobot):
         raise ConfigError(f"The live view shows the twin; robot: {running.stack.choice('robot').use} is not 'mujoco'.")
     return robot
@@ -238,7 +230,6 @@ class Narrator:
         self._said = ""
 
     def __call__(self) -> None:
-        """Look for news."""
         feedback = self._news.read()
         said = "" if feedback is None else feedback.stage + re.sub(r"[\d.]+", "", feedback.text)
         if feedback is not None and (said != self._said or feedback.data.get("failed")):

@@ -30,12 +30,7 @@ _SKILLS_EXAMPLE = "{pick: {force: 8}, mine: {use: my_skill.py:Mine}}"
 
 @dataclass(frozen=True)
 class Choice:
-    """One slot's implementation.
-
-    Attributes:
-        use: registered name, `package.module:Class` or `my_file.py:Class`.
-        options: its options by name.
-    """
+    """One slot's implementation; `use` is a registered name, `package.module:Class` or `my_file.py:Class`."""
 
     use: str
     options: dict[str, Any] = field(default_factory=dict)
@@ -78,7 +73,6 @@ class Stack:
     limits: str = "urdf"
 
     def __post_init__(self) -> None:
-        """Fill in the defaults."""
         defaults = {key: Choice(row.default) for key, row in KEYS.items() if row.standing is None}
         object.__setattr__(self, "choices", {**defaults, **self.choices})
 
@@ -90,11 +84,7 @@ class Stack:
         return Choice((row.standing if self.on_ground else None) or row.default)
 
     def part(self, name: str) -> Any:
-        """Return the config of a part, a key of `golem.slots.PARTS`.
-
-        Raises:
-            ConfigError: an option is wrong.
-        """
+        """Return the config of a part, a key of `golem.slots.PARTS`. Raises ConfigError: an option is wrong."""
         return registry.part(name, self.parts.get(name, {}))
 
     @property
@@ -104,11 +94,7 @@ class Stack:
 
     @property
     def on_ground(self) -> bool:
-        """Whether the robot stands on its feet, as its class says; see `robots.base.Standing`.
-
-        Raises:
-            ConfigError, ModuleFault: the class cannot be loaded.
-        """
+        """Whether the robot's class says that it stands; see `robots.base.Standing`. Raises as `registry.load` does."""
         robot = self.choice("robot")
         cls = registry.load("robot", robot.use)
         return issubclass(cls, Standing) and cls.on_feet(robot.options)
@@ -200,11 +186,7 @@ class Stack:
         return replace(self, skills={**self.skills, name: Choice(old.use, {**old.options, **options})})
 
     def with_part(self, name: str, **options: object) -> Stack:
-        """Return a copy in which a part, a key of `golem.slots.PARTS`, has some other options.
-
-        Raises:
-            ConfigError: an option is wrong.
-        """
+        """Return a copy with other options of a part, a key of `slots.PARTS`. Raises ConfigError: one is wrong."""
         parts = {**self.parts, name: {**self.parts.get(name, {}), **options}}
         registry.part(name, parts[name])
         return replace(self, parts=parts)
@@ -242,7 +224,7 @@ def load_stack(source: str | Path, profile: str | None = None, whole: bool = Fal
         elif path.is_file():
             text = path.read_text(encoding="utf-8")
         else:
-            meant = path.with_name(f"{path.name}.yaml")
+            meant = Path(f"{source}.yaml")
             hint = f" Did you mean '{meant}'?" if meant.is_file() else ""
             raise ConfigError(
                 f"No stack file '{source}'; give a path to a YAML file or one of: {', '.join(shipped())}.{hint}"

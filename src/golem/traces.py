@@ -35,11 +35,12 @@ class Trace:
 
 def trace_of(error: BaseException) -> Trace:
     """Return where `error`, which was just caught, was raised."""
-    frames = own_frames(traceback.walk_tb(error.__traceback__))
-    if not frames:
+    raised = traceback.format_exception_only(error)
+    if isinstance(error, SyntaxError) and is_users(error.filename or "<"):  # no line of it runs
+        return Trace(text="".join(raised).rstrip())
+    if not (frames := own_frames(traceback.walk_tb(error.__traceback__))):
         return Trace()
     lines = traceback.StackSummary.extract(iter(frames[-DEEPEST:])).format()
-    raised = traceback.format_exception_only(error)
     return Trace(place(frames), "".join(["Traceback (most recent call last):\n", *lines, *raised]).rstrip())
 
 

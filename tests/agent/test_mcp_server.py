@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import socket
 import threading
 from collections.abc import Awaitable, Callable
 from pathlib import Path
@@ -14,6 +15,8 @@ from tests.agent.fake_body import HOSTILE, Rig
 
 from golem.agent.mcp_server import http_app, make_server, tool_specs
 from golem.agent.tool_rules import Rules, ToolRule
+from golem.agent_command import McpConfig, run_mcp
+from golem.errors import ConfigError
 from golem.runtime.skill_table import SkillTable
 from golem.stack import Stack
 
@@ -119,6 +122,14 @@ def test_a_call_that_is_cancelled_stops_the_robot(tmp_path: Path, mode: str) -> 
 
     served(rig, talk)
     assert rig.body.x < 9.0 and "cancel" in rig.events()
+
+
+def test_a_port_that_cannot_be_had_is_said_before_a_robot_is_built(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("golem.agent_command.build", lambda *_: pytest.fail("built"))
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        for port in (taken.getsockname()[1], 99_999, -1):
+            with pytest.raises(ConfigError, match=rf"^Cannot listen on 127.0.0.1:{port} \(.*\); choose another port"):
+                run_mcp(McpConfig("tether", port=port))
 
 
 def test_only_who_has_the_token_is_served_over_http(tmp_path: Path) -> None:

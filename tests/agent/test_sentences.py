@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,19 +15,27 @@ from golem.agent.tool_rules import Rules
 from golem.errors import ConfigError
 from golem.evaluation.rungs.errands import SUITE
 
-PLACE = {"x": 0.5, "y": 0.2, "z": -0.1, "first_seen": 90_000.0, "last_seen": 86_000.0}
+PLACE = {
+    "x": 0.5, "y": 0.2, "z": -0.1, "first_seen": 90_000.0, "last_seen": 86_000.0, "evidence": words("seen"),
+}  # fmt: skip
 
 
 class Robot:
     """Answers as one whose memory has one place of everything, and before which stand three screws."""
 
-    def __init__(self, tight: int = 0) -> None:
+    def __init__(self, tight: int = 0, places: Sequence[Mapping[str, Any]] = (PLACE,)) -> None:
         self.calls: list[tuple[str, Mapping[str, Any]]] = []
-        self.left = tight
+        self.left, self.places = tight, places
 
     def __call__(self, tool: str, arguments: Mapping[str, Any]) -> dict[str, Any]:
         self.calls.append((tool, arguments))
-        done = {"success": True, "reason": words("Done."), "value": {"places": [PLACE]}}
+        done = {
+            "success": True,
+            "stage": "done",
+            "slot": None,
+            "reason": words("Done."),
+            "value": {"places": self.places},
+        }
         if tool == "read":
             return {"success": True, "state": {"base": {"x": 0.0, "y": 0.0, "yaw": 0.0}}}
         if tool == "look":
@@ -37,13 +45,27 @@ class Robot:
             self.left -= 1
             x, y = arguments["wanted"]
             tried = [{"outcome": words("tight"), "x": x, "y": y}]
-            return {"success": False, "reason": words("It is tight."), "value": {"tried": tried}}
+            return done | {"success": False, "stage": "extract", "slot": "arms", "value": {"tried": tried}}
         return done
 
 
 def said(sentence: str, tight: int = 0) -> tuple[Any, list[tuple[str, Mapping[str, Any]]]]:
     robot = Robot(tight)
     return SentencePlanner(robot).do(sentence), robot.calls
+
+
+def test_a_lost_errand_names_what_lost_it() -> None:
+    report, _ = said("take out three screws", tight=1)
+    assert (report.done, report.stage, report.slot) == (False, "extract", "arms")
+    forgetful = SentencePlanner(Robot(places=())).do("where was the mug")
+    assert (forgetful.done, forgetful.slot) == (False, "memory")
+
+
+@pytest.mark.parametrize("places", [(), (PLACE | {"evidence": words("moved")},)])
+def test_what_is_not_where_it_was_is_searched(places: Sequence[Mapping[str, Any]]) -> None:
+    robot = Robot(places=places)
+    assert not SentencePlanner(robot).do("where is the mug").done or places
+    assert robot.calls[-1] == ("search", {"text": "mug"})
 
 
 def test_a_thing_is_brought_to_where_another_was() -> None:
@@ -54,8 +76,29 @@ def test_a_thing_is_brought_to_where_another_was() -> None:
     ]
     assert report.done
     assert said("move the can where the bowl was 2 hours ago")[1][0][1]["ago"] == 7200.0
-    assert said("put the can back")[1][0][1] == {"text": "can", "when": "history", "limit": 20}
+    assert said("put the can back")[1][0][1] == {"text": "can", "when": "anywhere", "limit": 20}
     assert said("set the can 16 cm right of the mug")[1][1][1]["to"] == pytest.approx([0.5, 0.04])
+
+
+@pytest.mark.parametrize(
+    ("newest", "when", "x"),
+    [
+        ("seen", "", 0.1),
+        ("gone", "", 0.0),
+        ("seen", " at first", 0.2),
+        ("gone", " at first", 0.2),
+        ("seen", " before", 0.1),
+    ],
+)
+def test_where_a_thing_was_is_not_where_it_is(newest: str, when: str, x: float) -> None:
+    """Nobody looked again at the places before the newest: the memory still has the thing there, too."""
+    places = [
+        PLACE | {"x": 0.1 * k, "first_seen": 10.0 * (k + 1), "evidence": words(newest if k == 0 else "seen")}
+        for k in range(3)
+    ]
+    robot = Robot(places=places)
+    SentencePlanner(robot).do(f"put the can where the mug was{when}")
+    assert robot.calls[1][1]["to"] == pytest.approx([x, 0.2])
 
 
 def test_screws_of_a_side_are_tried_until_enough_are_out() -> None:
@@ -66,6 +109,28 @@ def test_screws_of_a_side_are_tried_until_enough_are_out() -> None:
     report, calls = said("take out all loose screws")
     assert report.facts["taken"] == 3
     assert not said("take out the three loose screws on the right")[0].done
+
+
+def test_a_screw_that_was_not_in_view_is_tried_again_after_another_look() -> None:
+    class Blinking(Robot):
+        """Its camera shows no screw at the first pick."""
+
+        def __call__(self, tool: str, arguments: Mapping[str, Any]) -> dict[str, Any]:
+            answer = super().__call__(tool, arguments)
+            first = [tool for tool, _ in self.calls].count("pick") == 1
+            unseen = {
+                "success": False,
+                "stage": "detect",
+                "slot": None,
+                "reason": words("No screw."),
+                "value": {"tried": []},
+            }
+            return unseen if tool == "pick" and first else answer
+
+    robot = Blinking()
+    report = SentencePlanner(robot).do("take out all loose screws")
+    picks = [a["wanted"] for tool, a in robot.calls if tool == "pick"]
+    assert picks == [[0.4, 0.1], [0.4, -0.2], [0.4, 0.3], [0.4, 0.1]] and report.facts["taken"] == 3 and report.done
 
 
 def test_questions_are_answered() -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from golem.dashboard.balance_chart import BAD, GOOD, PUSHED, REACH, SPAN, balance_chart
+from golem.dashboard.status import BAD, GOOD, PUSHED, REACH, SPAN, balance_chart
 from golem.robots.mujoco.balance import PERIOD, BalanceTrace
 from golem.types import Array
 

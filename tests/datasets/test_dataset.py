@@ -13,8 +13,8 @@ from tests.datasets.conftest import PLAIN, SMALL, frames, write
 from golem.capabilities.policies.vectors import STATE
 from golem.datasets import commands, swap
 from golem.datasets import episode_writer as writing
+from golem.datasets.commands import findings as check
 from golem.datasets.episode_writer import DatasetWriter
-from golem.datasets.findings import findings as check
 from golem.datasets.schema import DatasetError, Recipe
 from golem.datasets.store import DatasetFolder
 from golem.errors import GolemError, OutputError
@@ -202,6 +202,65 @@ def test_other_data_sets_are_told_apart(dataset: Path, tmp_path: Path) -> None:
         DatasetFolder(dataset).require("observation.state", like={"observation.state": ["main_shoulder_pan"]})
     with pytest.raises(DatasetError, match="has no observation.images.head"):
         DatasetFolder(dataset).require("observation.images.head")
+
+
+FEATURE = {"dtype": "float32", "shape": [3], "names": None}
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        *({"features": value} for value in (None, "x", [1], -1, {"a": 1})),
+        *({"features": {"action": FEATURE | wrong}} for wrong in (
+            {"shape": "x"}, {"shape": [-1]}, {"shape": []}, {"shape": 3}, {"names": 5}, {"dtype": "video"})),
+        {"features": {"observation.images.left": {"dtype": "video", "shape": [48, 64, 3], "names": None}}},
+        *({"fps": value} for value in (None, "fast", 0, -1, float("inf"), [15])),
+        *({"data_path": value} for value in ([1], -1, "{", "data/{episode_chunk:03d}.parquet")),
+        *({"video_path": value} for value in (None, [1], -1, "{", "videos/{episode_index:06d}.mp4")),
+    ],
+    ids=str,
+)  # fmt: skip
+def test_metadata_without_sense_is_damaged(dataset: Path, change: dict[str, object]) -> None:
+    path = dataset / "meta/info.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | change))
+    with pytest.raises(DatasetError, match="metadata of the data set .* is damaged"):
+        DatasetFolder(dataset)
+
+
+@pytest.mark.parametrize("column", ["data/chunk_index", "videos/observation.images.right_hand/from_timestamp"])
+def test_episodes_that_do_not_say_where_they_are_are_damaged(dataset: Path, column: str) -> None:
+    file = next((dataset / "meta/episodes").rglob("*.parquet"))
+    pq.write_table(pq.read_table(file).drop_columns([column]), file)
+    with pytest.raises(DatasetError, match=f"damaged: KeyError.*{column}"):
+        DatasetFolder(dataset)
+
+
+@pytest.mark.parametrize("column", ["timestamp", "frame_index", "index", "task_index", "action"])
+def test_a_table_without_a_column_is_a_finding(dataset: Path, column: str) -> None:
+    file = dataset / "data/chunk-000/file-001.parquet"
+    pq.write_table(pq.read_table(file).drop_columns([column]), file)
+    [found] = told(dataset)
+    assert found.startswith("Episode 1: ") and "\n" not in found
+    assert (f"cannot be read from {file}: No match for" if column == "action" else f"{file} has no {column};") in found
+
+
+@pytest.mark.parametrize("values", [[0.1], None, "x"])
+def test_frames_of_another_shape_are_a_finding(dataset: Path, values: object) -> None:
+    import pyarrow as pa
+
+    file = dataset / "data/chunk-000/file-001.parquet"
+    table = pq.read_table(file)
+    at = table.column_names.index("action")
+    pq.write_table(table.set_column(at, "action", pa.array([values] * table.num_rows)), file)
+    assert told(dataset) == ["Episode 1: action of episode 1 is not (25,), as info.json says."]
+
+
+@pytest.mark.parametrize("cut", [0.0, 0.5, 0.9])
+def test_a_torn_video_is_a_finding(dataset: Path, cut: float) -> None:
+    file = dataset / "videos/observation.images.right_hand/chunk-000/file-001.mp4"
+    file.write_bytes(file.read_bytes()[: int(cut * file.stat().st_size)] if cut else b"[1]")
+    [found] = told(dataset)
+    assert found.startswith("Episode 1: The video ")
 
 
 def test_a_data_set_without_frames(dataset: Path) -> None:

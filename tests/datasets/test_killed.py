@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from golem.datasets.findings import findings as check
+from golem.datasets.commands import findings as check
 from golem.datasets.store import DatasetFolder
 
 KILLS = int(os.environ.get("GOLEM_DATASET_KILLS", "6"))

@@ -16,8 +16,8 @@ from tests.dashboard.conftest import BLIND
 
 from golem.datasets import commands
 from golem.datasets.commands import PictureOptions
+from golem.datasets.commands import findings as check
 from golem.datasets.episode_writer import DatasetWriter
-from golem.datasets.findings import findings as check
 from golem.datasets.sampling import StackRecorder, recipe
 from golem.datasets.schema import DatasetError
 from golem.datasets.store import DatasetFolder

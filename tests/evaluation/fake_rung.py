@@ -103,8 +103,10 @@ def endless() -> None:
 
 
 def stuck() -> None:
-    """Hang in native code that never lets Python run again."""
-    ctypes.PyDLL(None).pause()
+    """Hang in native code that never lets Python run again, whatever signal comes."""
+    c, mutex = ctypes.PyDLL(None), ctypes.create_string_buffer(64)  # zeros: one that is free
+    for _ in range(2):
+        c.pthread_mutex_lock(mutex)
 
 
 def orphan() -> None:

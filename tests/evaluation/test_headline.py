@@ -23,7 +23,9 @@ COUNTS = ("claim", "said", "doable", "touches", "self_contacts", "steps", "below
 
 @pytest.mark.slow
 def test_a_robot_stands_to_the_last_digits_as_it_did() -> None:
-    assert golden.standing() == pytest.approx(golden.records()["standing"], rel=CLOSE, abs=1e-3 * CLOSE)
+    found = golden.standing()
+    for kept in golden.records()["standing"].values():
+        assert found == pytest.approx(kept, rel=CLOSE, abs=1e-3 * CLOSE)
 
 
 @pytest.mark.slow
@@ -31,16 +33,26 @@ def test_a_robot_stands_to_the_last_digits_as_it_did() -> None:
 @pytest.mark.parametrize("rung", ["tether", "stand"])
 def test_a_pick_comes_to_what_it_did(rung: str) -> None:
     """If it is meant to come to something else: `python -m tests.golden`."""
-    found, kept = golden.picked(rung), golden.records()[rung]
+    found, kept, mine = golden.picked(rung), golden.records()[rung], golden.processor()
+    others = {who: changed(rung, found, record) for who, record in kept.items()}
+    if all(others.values()):
+        assert mine not in kept, others[mine]
+        pytest.skip(f"Nobody has made a record on a processor of this kind: {mine}.")
+
+
+def changed(rung: str, found: golden.Record, kept: golden.Record) -> list[str]:
+    """Return the names of the figures that are not as they are kept."""
     assert found.keys() == kept.keys()
+    off: list[str] = []
     for name, value in kept.items():
         if name.startswith(COUNTS):
-            assert found[name] == value, name
+            same = found[name] == value
         elif name in AMPLIFIED.get(rung, kept):
-            off = TIME if name in ("total", "detect_to_grasp") else PLACE
-            assert found[name] == pytest.approx(value, abs=off), name
+            same = found[name] == pytest.approx(value, abs=TIME if name in ("total", "detect_to_grasp") else PLACE)
         else:
-            assert found[name] == pytest.approx(value, rel=CLOSE, abs=1e-3 * CLOSE), name
+            same = found[name] == pytest.approx(value, rel=CLOSE, abs=1e-3 * CLOSE)
+        off += [] if same else [name]
+    return off
 
 
 @pytest.mark.slow

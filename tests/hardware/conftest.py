@@ -14,7 +14,7 @@ from golem.hardware.safety.base import GateInputs, OperatorRequest, SafetyLimits
 from golem.hardware.safety.gate import Gate
 from golem.hardware.safety.memory import GateResult
 from golem.interfaces.payloads import EstopMessage, GateState
-from golem.robots.model.leg_dynamics import LegDynamics
+from golem.robots.model.leg_kernel import LegDynamics
 from golem.robots.model.mjcf import robot_spec
 from golem.robots.model.table import JOINT_NAMES
 from golem.types import GRAVITY, LEGS, NUM_JOINTS, Array, Imu, LowCommand, LowState

@@ -24,8 +24,8 @@ from golem.interfaces import public
 from golem.interfaces.payloads import GateState
 from golem.middleware.dds.base import Writer
 from golem.middleware.ros import codec, names
+from golem.middleware.ros.message import Header, pack
 from golem.middleware.ros.node import RosNode
-from golem.middleware.ros.request_header import Header, pack
 
 LEFT_OUT = ("/safety/stop", "/safety/reset", "/estop/press", "/elastic_band/release")
 COMMANDS = ("/cmd_vel", "/cmd_height", "/left/gripper/command", "/right/gripper/command")

@@ -103,7 +103,7 @@ def test_who_sends_slowly_takes_no_thread_and_keeps_nobody_out(
     assert threading.active_count() <= before + 3
     slow[0].settimeout(5.0)
     assert slow[0].recv(1) == b""  # the oldest were ended
-    monkeypatch.setattr(web_gate, "PATIENCE", -1.0)
+    monkeypatch.setattr(web_gate, "PATIENCE", 0.001)
     late = socket.create_connection(("127.0.0.1", gate.port), 5.0)
     assert late.recv(1) == b""
     for connection in (*slow, late):

@@ -62,7 +62,7 @@ def test_what_was_looked_for_is_remembered_where_it_is() -> None:
     seen = rig.see(1.0)
     rig.node.step(1.05)
     (place,) = rig.memory.query("mug")
-    assert place.position == pytest.approx(seen.objects[0].position) and place.last_seen == 1.0
+    assert place.position == pytest.approx(seen.objects[0].position, abs=0.001) and place.last_seen == 1.0
     assert rig.status == MemoryStatus(1.0, "odom", 0.0, 1)
     rig.node.step(1.1)
     assert rig.status.looks == 1  # one look counts once
@@ -90,7 +90,7 @@ def test_a_day_passes_for_the_memory_alone() -> None:
     rig.see(2.0, at=0.5)
     rig.node.step(2.05)
     (then,) = rig.memory.query("mug", "at", 10.0)
-    assert then.position == pytest.approx(seen.objects[0].position)
+    assert then.position == pytest.approx(seen.objects[0].position, abs=0.001)
     assert rig.memory.query("mug")[0].last_seen == 86_402.0
 
 
@@ -120,7 +120,7 @@ def test_places_are_the_maps_and_wait_for_it() -> None:
     x, y, z = rig.see(2.0).objects[0].position
     rig.node.step(2.0)
     (place,) = rig.memory.query("mug")
-    assert place.position == pytest.approx((3.0 - y, -1.0 + x, z))
+    assert place.position == pytest.approx((3.0 - y, -1.0 + x, z), abs=0.001)
     assert place.facts["sigma"] >= 0.1  # the odometry's own doubt
 
 

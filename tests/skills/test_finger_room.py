@@ -10,7 +10,7 @@ import pytest
 from golem.interfaces import topics
 from golem.robots.model.magpie_model import T_HAND_CAMERA, T_HAND_GRIPPER
 from golem.robots.sensors.cameras import RIGHT_HAND, rays
-from golem.skills.finger_room import ABOVE, RAISED, SLOW, TIPS, TURNS, FingerRoom
+from golem.skills.finger_room import ABOVE, PATIENCE, RAISED, SLOW, TIPS, TURNS, FingerRoom
 from golem.skills.poses import lifted
 from golem.types import Array, RgbdImage
 
@@ -95,3 +95,20 @@ def test_what_is_between_the_fingers_or_beside_them_is_in_nobodys_way(world: Any
         seen, T = room(world, box)
         seen.way(lifted(T, 0.004), lifted(T, 0.10), 0.15)
         assert not seen.blocked
+
+
+def test_beside_a_wall_the_fingers_fit_along_it(world: Any) -> None:
+    seen, T = room(world, (0.02, 1.0))
+    for k in range(round(2 * PATIENCE / world.context.period)):
+        seen.way(lifted(T, 0.004), lifted(T, 0.10), 0.15)
+        assert not seen.across or k * world.context.period > PATIENCE - 0.02
+    assert seen.blocked and seen.across
+
+
+def test_between_walls_on_all_sides_no_finger_fits(world: Any) -> None:
+    seen, T = room(world, (0.02, 1.0))
+    walled = np.hypot(*np.indices(seen._heights.shape) - np.array(seen._heights.shape)[:, None, None] / 2) > 5  # pyright: ignore
+    seen._heights[walled] = TOP  # pyright: ignore
+    for _ in range(round(2 * PATIENCE / world.context.period)):
+        seen.way(lifted(T, 0.004), lifted(T, 0.10), 0.15)
+    assert seen.blocked and not seen.across

@@ -10,8 +10,7 @@ import pytest
 
 from golem.capabilities.grasping.base import Grasp
 from golem.capabilities.planning.base import PlanRefused, Refusal
-from golem.skills.handle_look import VIEWS, seen_before
-from golem.skills.open_door import OpenConfig
+from golem.skills.open_door import VIEWS, OpenConfig, seen_before
 from golem.types import Array, Side
 
 HANDLE, SAID = np.array([0.57, 0.15, 0.14]), np.array([0.58, 0.08, 0.14])

@@ -10,23 +10,26 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from tests.skills.conftest import modules
-from tests.skills.job_world import JobWorld, edge_places, picked, write_list
+from tests.skills.job_world import NEAR_EDGE, JobWorld, at, edge_places, picked, write_list
 
 from golem.errors import ConfigError
 from golem.interfaces import topics
 from golem.middleware.bus import Bus
 from golem.robots.model.pinocchio_model import Kinematics
+from golem.skills.base import SkillResult
 from golem.skills.context import Context
 from golem.skills.disassemble_goal import DisassembleGoal
-from golem.skills.fastener_list import read_list
+from golem.skills.fastener_list import Listed, read_list
+from golem.skills.gantry import KEEP_OFF, SILENT, Gantry
 from golem.skills.job_file import Fate, JobFault, JobFile
-from golem.skills.pack_job import KEEP_OFF, SILENT, Gantry, fit_frames, matched
 from golem.skills.pack_picture import COLOURS
-from golem.skills.pick_config import PickReport
+from golem.skills.pack_view import SeenRim, fit_frames, matched
+from golem.skills.pick_config import PickReport, Tried
 from golem.types import PlanarPose
 
 PLACES = edge_places(30)
@@ -126,6 +129,27 @@ def test_what_was_not_seen_in_the_tray_is_lost_or_tried_again_if_it_is_still_the
     assert ends[4] == Fate.LOST and ends.count(Fate.IN_TRAY) == 31
 
 
+def test_what_is_in_a_tray_stays_there_whatever_a_hand_seems_to_be_at(tmp_path: Path) -> None:
+    class Askew(JobWorld):
+        """Its palm camera has number 5 where 4 was."""
+
+        def pick(self, goal: Any) -> SkillResult:
+            result = super().pick(goal)
+            if self.asked[-1] == 5 and 4 in self.out:
+                there = NEAR_EDGE @ at(self.places[4])
+                result.value.tried = [Tried(goal.side, there.x, there.y, 0.0, result.value.outcome)]
+            return result
+
+    write_list(tmp_path / "list.csv", PLACES)
+
+    def says(number: int, tries: int) -> PickReport:
+        return PickReport("tight") if number == 5 else picked(number, tries)
+
+    world = Askew(PLACES, tmp_path, says)
+    ends = world.run(DisassembleGoal(list="list.csv", job="pack.sqlite")).value.fates
+    assert ends[4:6] == [Fate.IN_TRAY, Fate.TIGHT] and world.asked.count(4) == 1
+
+
 def test_a_full_tray_is_changed_for_the_next_and_where_none_is_left_the_rest_waits(tmp_path: Path) -> None:
     def says(number: int, tries: int) -> PickReport:
         full = len(world.asked) > 5 and world.goals[-1].container == "tray"
@@ -142,7 +166,7 @@ def test_a_full_tray_is_changed_for_the_next_and_where_none_is_left_the_rest_wai
 
 def test_a_robot_that_gets_nowhere_gives_up_and_the_job_is_kept(tmp_path: Path) -> None:
     write_list(tmp_path / "list.csv", PLACES)
-    result = JobWorld(PLACES, tmp_path, fails="Dock").run(GOAL)
+    result = JobWorld(PLACES, tmp_path, fails="approach").run(GOAL)
     assert (result.success, result.stage, result.slot) == (False, "detect", "skill")
     assert set(result.value.fates) == {"open"} and (tmp_path / "pack_inventory.html").exists()
 
@@ -169,6 +193,42 @@ def test_a_bad_list_is_refused_in_a_sentence(rows: list[str], said: str, tmp_pat
         read_list(tmp_path / "list.csv", {"tray"})
     assert said in str(refused.value) and "\n" not in str(refused.value)
     assert not list(tmp_path.glob("*.sqlite"))
+
+
+@pytest.mark.parametrize(
+    "head",
+    ["", "\n", "class;x;y;z", "class\tx\ty\tz", "CLASS,X,Y,Z", "class,x,y,name", "class,x,x,y,z", "class,x,y,z,losse",
+     "screw,0.2,0.1,0", "# my pack"],
+)  # fmt: skip
+def test_a_first_line_that_names_other_columns_is_repeated_with_the_right_ones(head: str, tmp_path: Path) -> None:
+    (tmp_path / "list.csv").write_text(f"{head}\n{head.replace('class', 'screw')}\n")
+    with pytest.raises(ConfigError, match=r"first line of the list .*list.csv' is '.*'; it names class, x, y, z and"):
+        read_list(tmp_path / "list.csv", {"tray"})
+
+
+def test_a_list_as_spreadsheets_write_it_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "list.csv"
+    path.write_text("\ufeffclass, x, y, z, name, frame\r\nscrew, 0.1, 0.2, 0, My  screw, pack\r\n,,,,,\r\n", "utf-8")
+    assert read_list(path, {"tray"}) == [Listed("My screw", "screw", 0.1, 0.2, 0.0)]
+    path.write_text("class,x,y,z\nscrew,0,1,0,2,0\n")
+    with pytest.raises(ConfigError, match="line 2: it has more cells than the first line has columns; decimals have"):
+        read_list(path, {"tray"})
+
+
+@pytest.mark.parametrize(
+    "change", ["events SET fate = 'dancing'", "events SET number = 99", "events SET x = 'far'", "listed SET x = 'abc'"]
+)
+def test_a_job_that_says_what_no_job_says_is_damaged_and_stays(change: str, tmp_path: Path) -> None:
+    book = JobFile(tmp_path / "pack.sqlite", [Listed("A", "screw", 0.1, 0.2, 0.0)])
+    book.tell(book.fasteners[0], Fate.TRYING, 1.0, stance=PlanarPose(0.0, 0.0, 0.0))
+    book.close()
+    base = sqlite3.connect(tmp_path / "pack.sqlite")
+    base.execute(f"UPDATE {change}")
+    base.commit()
+    base.close()
+    for _ in range(2):  # it is closed again
+        with pytest.raises(JobFault, match="The job .*pack.sqlite is damaged, .*; name another file"):
+            JobFile(tmp_path / "pack.sqlite")
 
 
 def test_a_list_in_another_frame_or_absent_or_no_text_is_refused(tmp_path: Path) -> None:
@@ -287,3 +347,51 @@ def test_people_see_how_far_it_is(tmp_path: Path) -> None:
     assert shown is not None and set(fates) == {Fate.IN_TRAY}
     green = (shown.rgb == COLOURS[Fate.IN_TRAY]).all(axis=2)
     assert green.sum() > 20 * len(PLACES)
+
+
+def test_nuts_and_screws_go_into_the_listed_trays_for_them_and_a_full_one_is_left(tmp_path: Path) -> None:
+    places = edge_places(8)
+    kinds = ["nut" if k % 2 else "screw" for k in range(len(places))]
+    rows = [f"{kind},{x:.4f},{y:.4f},{z:.4f},," for kind, (x, y, z) in zip(kinds, places.tolist(), strict=True)]
+    trays = {"a": (0.145, -0.4, "bolt"), "b": (0.145, 0.1, "nut"), "c": (0.145, 0.4, "nut"), "d": (1.0, -0.6, "screw")}
+    rows += [f"tray,{x},{y},0.01,{name},{takes}" for name, (x, y, takes) in trays.items()]
+    (tmp_path / "list.csv").write_text("\n".join(["class,x,y,z,name,takes", *rows]))
+
+    def says(number: int, tries: int) -> PickReport:
+        full = np.hypot(*(NEAR_EDGE.matrix()[:2, 3] + trays["b"][:2] - world.goals[-1].container_at)) < 0.05
+        return PickReport("tray_full") if full and kinds[number] == "nut" else picked(number, tries)
+
+    world = JobWorld(places, tmp_path, says)
+    world.run(GOAL)
+    book = JobFile(tmp_path / "pack.sqlite")
+    book.close()
+    assert {one.tray for one in book.fasteners if one.label == "screw"} == {"a", "d", ""}
+    assert {one.tray for one in book.fasteners if one.label == "nut"} == {"c", ""}
+    assert [one.fate for one in book.fasteners].count(Fate.IN_TRAY) > 4
+
+
+def test_what_a_palm_camera_is_off_by_is_told_to_the_next_pick_of_that_hand(tmp_path: Path) -> None:
+    write_list(tmp_path / "list.csv", PLACES)
+    world = JobWorld(PLACES, tmp_path)
+    world.palm_off = (0.03, -0.02)
+    result = world.run(GOAL)
+    assert result.value.fates == ["in_tray"] * 32 and world.asked == list(dict.fromkeys(world.asked))
+    for side in ("left", "right"):
+        told = [goal.off for goal in world.goals if getattr(goal, "side", "") == side]
+        assert told[0] == () and told[1:] == [pytest.approx(world.palm_off, abs=1e-3)] * (len(told) - 1)
+
+
+def test_a_neighbour_is_not_taken_for_what_was_let_go(tmp_path: Path) -> None:
+    places = np.concatenate([PLACES, PLACES[:1] + (0.0, 0.028, 0.0)])
+    write_list(tmp_path / "list.csv", places)
+    world = JobWorld(places, tmp_path, lambda number, tries: PickReport("picked", [], "no" if number == 0 else "yes"))
+    assert world.run(GOAL).value.fates[0] == "lost" and world.asked.count(0) == 1
+
+
+def test_a_head_camera_that_looks_aside_shows_a_rim_that_slopes() -> None:
+    rng = np.random.default_rng(0)
+    places = rng.uniform((0.0, -0.4), (0.6, 0.4), (12, 2))
+    rim = SeenRim.of(places, -0.1 + places @ (0.05, -0.08) + 0.002 * rng.normal(size=12))
+    assert rim.at(np.array([0.3, 0.5, 0.0])) == pytest.approx(-0.1 + 0.3 * 0.05 - 0.5 * 0.08, abs=0.006)
+    row = SeenRim.of(np.column_stack([np.full(12, 0.02), places[:, 1]]), np.full(12, -0.1))
+    assert row.at(np.array([0.6, 0.0])) == pytest.approx(-0.1, abs=1e-6)

@@ -41,13 +41,13 @@ def trays(n: int) -> dict[str, Array]:
 def test_a_plan_covers_what_can_be_covered_once_each_and_is_made_in_two_seconds() -> None:
     ones = pack(0)
     sides = PackSides(np.array([one.place for one in ones]))
-    make_plan(sides, ones[:1], {}, START, RIM)  # reads the map of reach
+    make_plan(sides, ones[:1], {}, START, [RIM])  # reads the map of reach
     begin = time.process_time()
-    plan = make_plan(sides, ones, trays(4), START, RIM)
+    plan = make_plan(sides, ones, trays(4), START, [RIM])
     assert time.process_time() - begin < 2.0
     taken = [number for stop in plan for number, _ in stop.picks]
     assert len(set(taken)) == len(taken) > 75
-    assert plan == make_plan(sides, ones, trays(4), START, RIM)
+    assert plan == make_plan(sides, ones, trays(4), START, [RIM])
     for stop in plan:
         for number, side in stop.picks:
             local = stop.pose.to(PlanarPose(ones[number].listed.x, ones[number].listed.y, 0.0))
@@ -57,13 +57,13 @@ def test_a_plan_covers_what_can_be_covered_once_each_and_is_made_in_two_seconds(
 def test_a_stance_that_failed_and_what_is_near_the_gantry_are_left_out() -> None:
     ones = pack(1)
     sides = PackSides(np.array([one.place for one in ones]))
-    plan = make_plan(sides, ones, {}, START, RIM)
+    plan = make_plan(sides, ones, {}, START, [RIM])
     number, side = plan[0].picks[0]
     ones[number].barred = [(plan[0].pose, "left"), (plan[0].pose, "right")]
-    again = [stop for stop in make_plan(sides, ones, {}, START, RIM) if number in dict(stop.picks)]
+    again = [stop for stop in make_plan(sides, ones, {}, START, [RIM]) if number in dict(stop.picks)]
     assert again and np.hypot(again[0].pose.x - plan[0].pose.x, again[0].pose.y - plan[0].pose.y) > 0.1
     gantry = np.array([0.6, 0.9])
-    off = make_plan(sides, ones, {}, START, RIM, (gantry, 1.0))
+    off = make_plan(sides, ones, {}, START, [RIM], (gantry, 1.0))
     assert all(np.hypot(stop.pose.x - 0.6, stop.pose.y - 0.9) > 1.0 for stop in off)
     taken = [number for stop in off for number, _ in stop.picks]
     assert taken and all(np.hypot(*(ones[k].place[:2] - gantry)) > 1.0 for k in taken)
@@ -74,7 +74,7 @@ def test_a_list_of_one_edge_is_worked_on_from_that_edge() -> None:
         PackFastener(k, Listed(f"{k}", "screw", 0.022, y, 0.0))
         for k, y in enumerate(np.linspace(-0.5, 0.5, 9).tolist())
     ]
-    plan = make_plan(PackSides(np.array([one.place for one in ones])), ones, {}, START, RIM)
+    plan = make_plan(PackSides(np.array([one.place for one in ones])), ones, {}, START, [RIM])
     assert sum(len(stop.picks) for stop in plan) == 9 and all(stop.pose.x < -0.3 for stop in plan)
 
 
@@ -131,7 +131,7 @@ def test_plans_are_within_15_percent_of_the_best(packs: int) -> None:
 
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr("golem.skills.pack_plan.choose", kept)
-            plan = make_plan(sides, ones, trays(4), START, RIM)
+            plan = make_plan(sides, ones, trays(4), START, [RIM])
         [(served, ring)] = seen
         least = exact(served, ring, start, sides.length)
         over.append((DOCKING * len(plan) + sum(stop.way for stop in plan)) / least - 1.0)

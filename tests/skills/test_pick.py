@@ -19,6 +19,7 @@ from golem.interfaces.payloads import DetectionRequest
 from golem.robots.model.magpie_model import MAX_GAP
 from golem.skills.base import SkillResult
 from golem.skills.pick import Pick, PickConfig, PickGoal, followed
+from golem.skills.pick_targets import called
 from golem.skills.runner import SkillRun
 from golem.types import Array, CameraInfo, LocalizedObject, RgbdImage, Side
 
@@ -47,15 +48,11 @@ def full(world: Any, thing: Any) -> Any:
 
 
 def picked(
-    world: Any,
-    method: GraspMethod | None = None,
-    side: Side = "right",
-    config: PickConfig = CONFIG,
-    avoid: tuple[float, ...] = (),
+    world: Any, method: GraspMethod | None = None, side: Side = "right", config: PickConfig = CONFIG, **goal: Any
 ) -> SkillResult:
     """Run a pick to its end."""
     world.method = method or VisualServo()
-    run = world.run(Pick(config).run(world.context, PickGoal(side=side, avoid=avoid)))
+    run = world.run(Pick(config).run(world.context, PickGoal(side=side, **goal)))
     assert run.result is not None
     return run.result
 
@@ -102,20 +99,49 @@ def test_the_hand_closes_where_the_palm_camera_saw_the_screw(full: Any) -> None:
     assert np.linalg.norm((seen_at[0] - SCREW)[:2]) < 0.003
 
 
-def test_the_screw_is_let_go_above_the_tray_however_much_the_head_camera_is_off(full: Any) -> None:
+def let_go_at(world: Any, **goal: Any) -> Array:
+    """Return where a pick let go, (3,) in odom."""
     let_go: list[Array] = []
-    tick = full.step
+    tick = world.step
 
     def step() -> None:
-        held = full.holds
+        held = world.holds
         tick()
-        goal = full.bus.latest(topics.hand_goal("right"))
+        goal = world.bus.latest(topics.hand_goal("right"))
         if held and goal is not None and goal.gap is not None and not let_go:
-            let_go.append(full.context.arms["right"].commanded[:3, 3].copy())
+            let_go.append(world.context.arms["right"].commanded[:3, 3].copy())
 
-    full.step = step
-    picked(full)
-    np.testing.assert_allclose(let_go[0], TRAY + (0.0, 0.0, CONFIG.drop_height), atol=1e-9)
+    world.step = step
+    picked(world, **goal)
+    return let_go[0]
+
+
+def test_the_screw_is_let_go_above_the_tray_however_much_the_head_camera_is_off(full: Any) -> None:
+    np.testing.assert_allclose(let_go_at(full), TRAY + (0.0, 0.0, CONFIG.drop_height), atol=1e-9)
+
+
+def test_a_neighbour_of_the_one_that_is_wanted_is_let_go_above_the_tray_too(full: Any, thing: Any) -> None:
+    beside = SCREW + (0.0, 0.09, 0.0)
+    see = full.objects["head"]
+    full.objects["head"] = lambda: [*see(), thing("screw", beside + HEAD_ERROR, full.t)]
+    full.objects["right_hand"] = lambda: [thing("screw", beside, full.t)]
+    at = let_go_at(full, wanted=tuple((SCREW + HEAD_ERROR)[:2].tolist()))
+    assert np.linalg.norm((at - TRAY)[:2]) < 0.03
+
+
+def test_what_stands_on_another_level_is_not_what_is_wanted(full: Any, thing: Any) -> None:
+    here, level = tuple((SCREW + HEAD_ERROR)[:2].tolist()), float((SCREW + HEAD_ERROR)[2])
+    assert picked(full, wanted=here, level=(level,)).success
+    stocked(full, thing)
+    failed(picked(full, wanted=here, level=(level - 0.065,)), "detect", "localizer", "no reachable", "nothing_there")
+
+
+def test_a_neighbour_is_not_taken_where_it_is_known_what_the_palm_camera_is_off_by(full: Any, thing: Any) -> None:
+    here, off = tuple((SCREW + HEAD_ERROR)[:2].tolist()), tuple((-HEAD_ERROR)[:2].tolist())
+    assert picked(full, wanted=here, off=off).success
+    stocked(full, thing)
+    full.objects["right_hand"] = lambda: [thing("screw", SCREW + (0.0, 0.05, 0.0), full.t)]
+    failed(picked(full, wanted=here, off=off), "servo", "localizer", "lost the screw", "nothing_there")
 
 
 @pytest.mark.parametrize(
@@ -283,8 +309,25 @@ def test_a_screw_the_palm_camera_never_sees_is_lost(full: Any) -> None:
     assert_safe(full)
 
 
+def test_a_screw_that_cameras_call_a_nut_is_taken_where_it_is_known_to_stand(full: Any, thing: Any) -> None:
+    see = full.objects["head"]
+    full.objects["head"] = lambda: [called(one, "nut") if one.label == "screw" else one for one in see()]
+    for side in ("left", "right"):
+        full.objects[f"{side}_hand"] = lambda: [thing("nut", SCREW, full.t)]
+    failed(picked(full), "detect", "localizer", "no reachable screw", "nothing_there")
+    here = tuple((SCREW + HEAD_ERROR)[:2].tolist())
+    assert picked(full, wanted=here).success
+    assert full.bus.latest(topics.detection_request("right_hand")) == DetectionRequest()
+
+
+def test_a_hand_that_hangs_off_its_goal_is_sent_beyond_it(full: Any) -> None:
+    full.kinematics.offset = np.array([0.006, 0.004, 0.0])
+    assert picked(full).success
+    assert_safe_after_offset(full)
+
+
 def test_a_hand_that_cannot_follow_stalls(full: Any) -> None:
-    full.kinematics.offset = np.array([0.01, 0.0, 0.0])
+    full.kinematics.offset = np.array([0.03, 0.0, 0.0])
     result = picked(full)
     assert (result.stage, result.slot) == ("servo", "upper_body"), result
     assert_safe_after_offset(full)

@@ -74,6 +74,14 @@ def test_the_palm_camera_finds_it_beside_where_it_seemed() -> None:
     assert seen_again(np.zeros((0, 3)), can_at(can), trust=0.15) is None
 
 
+def test_the_palm_camera_tells_things_apart_that_stand_close_to_each_other() -> None:
+    table, can = table_with_can()
+    _, other = table_with_can((0.5, -0.2 + 2 * 0.034 + 0.018))
+    found = seen_again(np.concatenate([table, can, other]), can_at(can + (0.01, -0.02, 0.0)), trust=0.15)
+    assert found is not None
+    assert np.median(found[0].points, axis=0)[:2] == pytest.approx([0.5, -0.2], abs=0.01)
+
+
 def test_of_what_stands_there_that_of_the_right_size_is_taken() -> None:
     table, can = table_with_can()
     rng = np.random.default_rng(2)

@@ -26,8 +26,7 @@ _UNSEEN = re.compile(r"[\x00-\x1f\x7f-\x9f\u200b-\u200f\u2028-\u202e\u2060-\u206
 
 def words(text: str, from_world: bool = True) -> dict[str, Any]:
     """Return marked words, of which people see every character."""
-    seen = _UNSEEN.sub(" ", text.encode("utf-8", "replace").decode())
-    return {"from_world": from_world, "text": seen[:LONGEST]}
+    return {"from_world": from_world, "text": _UNSEEN.sub(" ", text.encode("utf-8", "replace").decode())[:LONGEST]}
 
 
 def marked(value: Any, schema: Schema) -> Any:

@@ -19,11 +19,7 @@ class AuditLog:
     """Writes one file."""
 
     def __init__(self, file: Path, **first: object) -> None:
-        """Go on with `file`; `first` says what it belongs to, such as the bag that is recorded.
-
-        Raises:
-            OutputError: it cannot be written.
-        """
+        """Go on with `file`; `first` says what it belongs to, e.g. a bag. Raises OutputError: it cannot be written."""
         try:
             file.parent.mkdir(parents=True, exist_ok=True)
             self._out = os.open(file, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600)
@@ -49,11 +45,7 @@ def _kept(value: object) -> object:
 
 
 def read_audit(file: Path) -> list[dict[str, Any]]:
-    """Return the lines of a log.
-
-    Raises:
-        ConfigError: it cannot be read, or a line is none; names it.
-    """
+    """Return the lines of a log. Raises ConfigError: it cannot be read, or a line is none; names it."""
     entries: list[dict[str, Any]] = []
     try:
         for line in file.read_text(encoding="utf-8").splitlines():

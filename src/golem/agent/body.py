@@ -60,7 +60,6 @@ class Body(ABC):
         specs: its skills.
         paced: whether time passes by itself.
         t: robot time [s].
-        busy: whether a skill runs.
     """
 
     specs: Mapping[str, SkillSpec]

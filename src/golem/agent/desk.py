@@ -251,8 +251,7 @@ class Desk:
     def _begin(self, call: Call) -> None:
         if self._active is not None:
             raise GolemError("Another skill is running; cancel it first.")
-        fields = call.fields
-        self.body.begin("remember" if call.tool == "look" else call.tool, fields)
+        self.body.begin("remember" if call.tool == "look" else call.tool, call.fields)
         self._count[call.tool] += 1
         self._active, self._over, self._before = call, "", None
         self._felt.clear()

@@ -42,11 +42,7 @@ class DomainBody(Body):
     paced = True
 
     def __init__(self, participant: Participant, node: RosNode, remedy: str, jobs: Path = Path()) -> None:
-        """Speak as a member of a domain; see `Body`.
-
-        Raises:
-            RosError: no stack is there; `remedy` says what to do.
-        """
+        """Speak as a member of a domain; see `Body`. Raises RosError: no stack is there; `remedy` says what to do."""
         super().__init__(Bus(), jobs)
         self._node, self._remedy, self.t = node, remedy, 0.0
         self.specs = ask_skills(node, remedy)

@@ -6,6 +6,7 @@ import asyncio
 import base64
 import hmac
 import json
+import socket
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from importlib import import_module
@@ -15,7 +16,7 @@ from golem import __version__
 from golem.agent.answers import answer_schema, words
 from golem.agent.desk import OWN, RESOURCES, STILL, Answer, Call, Desk
 from golem.agent.tool_rules import ToolRule
-from golem.errors import MissingExtra
+from golem.errors import needs
 from golem.interfaces.payloads import Feedback
 from golem.skills.spec import Schema, SkillSpec
 
@@ -72,23 +73,13 @@ INSTRUCTIONS = (
 
 
 def modules() -> tuple[Any, Any]:
-    """Return the modules of the server and of the types of `mcp`.
-
-    Raises:
-        MissingExtra: it is not installed.
-    """
-    try:
+    """Return the modules of the server and of the types of `mcp`. Raises MissingExtra: it is not installed."""
+    with needs("", "agent"):
         return import_module("mcp.server.lowlevel.server"), import_module("mcp_types")
-    except ModuleNotFoundError as error:
-        raise MissingExtra(error.name or "mcp", "agent") from error
 
 
 def make_server(desk: Desk, name: str = "golem") -> Any:
-    """Return a server, `mcp.server.lowlevel.Server`, of the tools and resources of `desk`.
-
-    Raises:
-        MissingExtra: mcp is not installed.
-    """
+    """Return an MCP server of the tools and resources of `desk`. Raises MissingExtra: mcp is not installed."""
     server, types = modules()
 
     async def list_tools(context: Any, params: Any) -> Any:
@@ -201,8 +192,7 @@ def http_app(desk: Desk, token: str) -> Callable[..., Awaitable[None]]:
     return guarded
 
 
-async def serve_http(desk: Desk, port: int, token: str) -> None:
-    """Serve on a port of this machine until the process ends."""
+async def serve_http(desk: Desk, listener: socket.socket, token: str) -> None:
+    """Serve whoever connects to `listener` until the process ends."""
     uvicorn = import_module("uvicorn")
-    config = uvicorn.Config(http_app(desk, token), host="127.0.0.1", port=port, log_level="warning")
-    await uvicorn.Server(config).serve()
+    await uvicorn.Server(uvicorn.Config(http_app(desk, token), log_level="warning")).serve([listener])

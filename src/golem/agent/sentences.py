@@ -19,6 +19,8 @@ NUMBERS = {"a": 1, "one": 1, "two": 2, "three": 3, "four": 4, "five": 5, "six": 
 SPANS = {"second": 1.0, "minute": 60.0, "hour": 3600.0, "day": 86400.0}
 BESIDE = 20
 """How far beside another thing is, where nobody says [cm]."""
+LOOKS, APART = 3, 0.02
+"""How often screws are looked for, and how far apart places of two of them are [m]."""
 SURE = 0.5
 """Score from which on a thing is counted."""
 _DATA = load_data(__package__, "sentences.yaml")
@@ -36,11 +38,14 @@ class ErrandReport:
         text: a sentence.
         facts: what was found out, as numbers: `place` (x, y, z in the memory's frame [m]), `count`, `taken`, and
             `tight` and `jammed`, x and y in odom [m] of each.
+        stage, slot: the stage of the tool that failed, and the module that it blames.
     """
 
     done: bool
     text: str
     facts: dict[str, Any] = field(default_factory=dict[str, Any])
+    stage: str = "errand"
+    slot: str | None = "memory"
 
 
 class Spot(NamedTuple):
@@ -58,11 +63,7 @@ class SentencePlanner:
         self._use = use
 
     def do(self, words: str) -> ErrandReport:
-        """Do what a sentence says.
-
-        Raises:
-            ConfigError: it is none that is known.
-        """
+        """Do what a sentence says. Raises ConfigError: it is none that is known."""
         sentence = " ".join(words.lower().split()).rstrip(".?!")
         for pattern, script in SENTENCES.items():
             found = re.fullmatch(pattern, sentence)
@@ -71,26 +72,28 @@ class SentencePlanner:
         raise ConfigError(f"The planner does not know how to '{shorten(words)}'; say it as in {EXAMPLES}.")
 
     def _recall(self, thing: str, tense: str, when: str = "") -> Spot | None:
-        past = tense in ("was", "stood")
-        question: dict[str, Any] = {"text": thing, "when": "history" if past else "now", "limit": 20}
+        question: dict[str, Any] = {"text": thing, "when": "now" if tense == "is" else "anywhere", "limit": 20}
         number, _, span = when.partition(" ")
         if when == "yesterday":
             question |= {"when": "at", "ago": SPANS["day"]}
         elif number.isdecimal():
             question |= {"when": "at", "ago": float(number) * SPANS[span.split()[0].rstrip("s")]}
-        said = self._use("recall", question)
-        places = (said.get("value") or {}).get("places", [])
-        if not places and past and not when:
-            places = (self._use("recall", question | {"when": "now"}).get("value") or {}).get("places", [])
+        places = (self._use("recall", question).get("value") or {}).get("places", [])
+        if tense == "is":  # what was looked for in its place, and not seen, is elsewhere
+            places = [place for place in places if place["evidence"]["text"] != "moved"]
         if not places:
             return None
         best = max(places, key=lambda p: p["first_seen"]) if when == "at first" else places[0]
+        if question["when"] == "anywhere" and best["evidence"]["text"] == "seen" and when != "at first":
+            # It was seen there last, and is there; nobody has looked again at every place where it was before.
+            best = places[min(1, len(places) - 1)]
         return Spot(best["x"], best["y"], best["z"])
 
     def _fetch(self, thing: str, to: Spot | None) -> ErrandReport:
         goal = {"text": thing} if to is None else {"text": thing, "to": [to.x, to.y], "frame": "seen"}
         said = self._use("fetch", goal)
-        return ErrandReport(said["success"], said["reason"]["text"], {} if to is None else {"place": list(to)})
+        facts = {} if to is None else {"place": list(to)}
+        return ErrandReport(said["success"], said["reason"]["text"], facts, said["stage"], said["slot"])
 
     def _to_where(self, thing: str, other: str, tense: str, when: str = "") -> ErrandReport:
         spot = self._recall(other, tense, when)
@@ -104,14 +107,17 @@ class SentencePlanner:
     def _beside(self, thing: str, way: str, other: str, cm: str = str(BESIDE)) -> ErrandReport:
         spot = self._recall(other, "is")
         if spot is None:
-            return ErrandReport(False, f"Nothing is remembered of the {other}.")
+            found = self._find(other)
+            if not found.done:
+                return found
+            spot = Spot(*found.facts["place"])
         aside = 0.01 * float(cm) * (1.0 if way == "left" else -1.0)
         return self._fetch(thing, spot._replace(y=spot.y + aside))
 
     def _where(self, thing: str, tense: str, when: str = "") -> ErrandReport:
         spot = self._recall(thing, tense, when)
         if spot is None:
-            return ErrandReport(False, f"Nothing is remembered of the {thing}.")
+            return self._find(thing) if tense == "is" else ErrandReport(False, f"Nothing is remembered of the {thing}.")
         return ErrandReport(
             True, f"The {thing} {tense} at ({spot.x:.2f}, {spot.y:.2f}, {spot.z:.2f}).", {"place": list(spot)}
         )
@@ -128,32 +134,43 @@ class SentencePlanner:
         said = self._use("search", {"text": thing})
         places = (said.get("value") or {}).get("places", [])
         facts = {"place": [places[0][axis] for axis in "xyz"]} if places else {}
-        return ErrandReport(said["success"] and bool(places), said["reason"]["text"], facts)
+        done = said["success"] and bool(places)
+        return ErrandReport(done, said["reason"]["text"], facts, said["stage"], said["slot"])
 
     def _screws(self, number: str = "all", side: str = "") -> ErrandReport:
-        """Pick what is seen on a side, the nearest to the middle first, until so many are out."""
-        state = self._use("read", {"resource": "state"}).get("state", {})
-        base = state.get("base", {"x": 0.0, "y": 0.0, "yaw": 0.0})
-        seen = self._use("look", {"camera": "head", "labels": ["screw"]}).get("found", [])
+        """Pick what is seen on a side, the nearest to the middle first, until so many are out; look again for more."""
+        wanted = int(number) if number.isdecimal() else NUMBERS.get(number, 0)
+        taken, ends, tried = 0, dict[str, list[list[float]]](), list[tuple[float, float]]()
+        lost: tuple[str, str | None] = ("detect", "localizer")
+        for _ in range(LOOKS):
+            places = [(x, y) for x, y in self._seen(side) if all(math.dist((x, y), at) > APART for at in tried)]
+            wanted = wanted or len(places)
+            for x, y in places:
+                if taken == wanted:
+                    break
+                said = self._use("pick", {"side": "either", "wanted": [x, y]})
+                taken += said["success"]
+                hands = (said.get("value") or {}).get("tried", [])
+                if said["success"] or hands:
+                    tried.append((x, y))
+                if not said["success"]:
+                    lost = said["stage"], said["slot"]
+                if not said["success"] and hands:
+                    ends.setdefault(hands[-1]["outcome"]["text"], []).append([hands[-1]["x"], hands[-1]["y"]])
+        text = f"{taken} screws are out" + "".join(f"; {len(places)} {end}" for end, places in ends.items())
+        facts = {"taken": taken} | {end: ends.get(end, []) for end in ("tight", "jammed")}
+        return ErrandReport(taken >= wanted, f"{text}.", facts, *lost)
+
+    def _seen(self, side: str) -> list[tuple[float, float]]:
+        """Return x, y in odom [m] of the screws that are in view on a side, the nearest to the middle first."""
+        base = self._use("read", {"resource": "state"}).get("state", {}).get("base", {"x": 0.0, "y": 0.0, "yaw": 0.0})
         places: list[tuple[float, float, float]] = []
-        for one in seen:
+        for one in self._use("look", {"camera": "head", "labels": ["screw"]}).get("found", []):
             dx, dy = one["position"][0] - base["x"], one["position"][1] - base["y"]
             aside = -math.sin(base.get("yaw", 0.0)) * dx + math.cos(base.get("yaw", 0.0)) * dy
             if side == "" or (aside > 0.0) == (side == "left"):
                 places.append((abs(aside), *one["position"][:2]))
-        wanted = int(number) if number.isdecimal() else NUMBERS.get(number, len(places))
-        taken, ends = 0, dict[str, list[list[float]]]()
-        for _, x, y in sorted(places):
-            if taken == wanted:
-                break
-            said = self._use("pick", {"side": "either", "wanted": [x, y]})
-            taken += said["success"]
-            tried = (said.get("value") or {}).get("tried", [])
-            if not said["success"] and tried:
-                ends.setdefault(tried[-1]["outcome"]["text"], []).append([tried[-1]["x"], tried[-1]["y"]])
-        told = {"tight": ends.get("tight", []), "jammed": ends.get("jammed", [])}
-        text = f"{taken} screws are out" + "".join(f"; {len(places)} {end}" for end, places in ends.items())
-        return ErrandReport(taken >= wanted, f"{text}.", {"taken": taken, **told})
+        return [(x, y) for _, x, y in sorted(places)]
 
 
 def replay(file: Path, use: Use) -> Iterator[tuple[str, bool, bool]]:

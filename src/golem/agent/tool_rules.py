@@ -65,7 +65,6 @@ class Rules:
 
     Attributes:
         default: how a tool without a rule of its own runs.
-        tools: rules by the names of tools.
         region: where the robot may be; None: anywhere.
         speed: of base_link over the floor above which a skill is cancelled [m/s].
         force: of a hand on the world, beyond what it had when the skill began, above which it is cancelled [N].
@@ -95,7 +94,6 @@ class Rules:
         """Return why a goal is not allowed; empty where it is.
 
         Args:
-            tool: its tool.
             goal: all its fields, with their defaults.
             places: x, y in odom of where it sends the robot or what it holds [m].
         """
@@ -143,17 +141,13 @@ def _values(goal: Any, path: list[str]) -> Iterator[Any]:
 
 
 def load_rules(file: Path | None) -> Rules:
-    """Return the rules in a YAML file; those by default where there is none.
-
-    Raises:
-        ConfigError: it cannot be read, or a rule makes no sense.
-    """
+    """Return the rules in a YAML file, else the default ones. Raises ConfigError: unreadable, or makes no sense."""
     if file is None:
         return Rules()
     try:
         said = read_yaml(file.read_text(encoding="utf-8"), file.name)
     except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"The rules '{file}' cannot be read: {error}.") from error
+        raise ConfigError(f"The rules '{file}' cannot be read: {getattr(error, 'strerror', None) or error}.") from error
     if not isinstance(said, dict):
         raise ConfigError(f"{file.name}: rules are a mapping, such as 'default: ask'.")
     check_values(file.name, said)

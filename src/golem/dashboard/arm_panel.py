@@ -47,11 +47,7 @@ class MoveArms:
 
 
 class ArmPanel:
-    """Sliders and gizmos of one server. Those that nobody has touched follow the robot.
-
-    Attributes:
-        move: to be listened to.
-    """
+    """Sliders and gizmos of one server; `move` is listened to. Those that nobody has touched follow the robot."""
 
     def __init__(self, server: viser.ViserServer, from_odom: Callable[[Array], Array]) -> None:
         """Add them; `from_odom` brings a point (3,) of odom into the world that is shown, whose axes are the same."""

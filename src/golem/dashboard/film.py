@@ -18,9 +18,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 from tqdm import tqdm
 
-from golem.dashboard.balance_chart import SPAN, balance_chart
-from golem.dashboard.map_view import map_view
-from golem.dashboard.status import Status, camera_picture, read_status
+from golem.dashboard.status import SPAN, Status, balance_chart, camera_picture, map_view, read_status
 from golem.errors import OutputError
 from golem.interfaces import topics
 from golem.interfaces.payloads import GateState
@@ -94,7 +92,6 @@ class Film:
         """Film `robot`.
 
         Args:
-            robot: the twin.
             size: width and height of the film [px].
             fps: pictures per second of robot time.
             recorder: whoever samples its balance; its CoM margin is then in the picture.
@@ -109,7 +106,6 @@ class Film:
         self.headline = ""
 
     def __len__(self) -> int:
-        """Return the number of pictures taken."""
         return len(self._frames)
 
     def tick(self, running: LockstepRunner) -> None:
@@ -119,11 +115,7 @@ class Film:
             self.frame(running)
 
     def frame(self, running: LockstepRunner) -> NDArray[np.uint8]:
-        """Take one picture and keep it.
-
-        Returns:
-            (height, width, 3) RGB.
-        """
+        """Take one picture, (height, width, 3) RGB, keep it and return it."""
         status = read_status(running)
         if running.bus.latest(topics.MAP) is not None:
             self._view.follow(BASE_LINK)

@@ -17,13 +17,11 @@ from typing import TYPE_CHECKING, Any
 import cv2
 import numpy as np
 
-from golem.dashboard.balance_chart import SPAN, balance_chart
 from golem.dashboard.film import LiveFilm
 from golem.dashboard.history import History, Snapshot, read_signals
-from golem.dashboard.map_view import map_view
 from golem.dashboard.panel import Button, Panel
 from golem.dashboard.server import Stage, serve
-from golem.dashboard.status import Timeline, camera_picture, clouds, read_status
+from golem.dashboard.status import SPAN, Timeline, balance_chart, camera_picture, clouds, map_view, read_status
 from golem.errors import GolemError
 from golem.hardware.safety.base import OperatorRequest
 from golem.interfaces import topics
@@ -85,8 +83,6 @@ class LiveView(AbstractContextManager["LiveView", None]):
         """Start serving.
 
         Args:
-            running: the stack.
-            robot: its twin.
             port: TCP port; 0 takes a free one.
             host: address to listen at; the default is reachable from this machine only, any other asks for a token.
             restarts: whether there is a button to start over, which makes `operate` return.
@@ -393,5 +389,4 @@ class LiveView(AbstractContextManager["LiveView", None]):
         self._view.close()
 
     def __exit__(self, *_: object) -> None:
-        """Stop serving."""
         self.close()

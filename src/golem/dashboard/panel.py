@@ -27,11 +27,7 @@ if TYPE_CHECKING:
 
 
 class SkillPanel:
-    """Form and buttons of one server.
-
-    Attributes:
-        start, cancel: to be listened to.
-    """
+    """Form and buttons of one server; `start` and `cancel` are listened to."""
 
     def __init__(self, gui: viser.GuiApi, skills: Mapping[str, SkillSpec], first: str) -> None:
         """Add the controls to `gui`, with the skill called `first` chosen if there is one."""
@@ -156,7 +152,6 @@ class Panel:
     """The panel of one server. Buttons are pressed in the server's threads; `pressed` hands them over.
 
     Attributes:
-        skill: the skill and its goal.
         legs: the controls of a robot on its feet; None for one that hangs.
         arms, view: the controls of the arms, and of what is shown.
     """
@@ -168,9 +163,7 @@ class Panel:
         """Build the panel of `server`.
 
         Args:
-            server: of the view.
             from_odom: see `ArmPanel`.
-            skills: what there is to start.
             first: the skill that is chosen at first.
             standing: whether the robot stands on its feet.
             restarts: whether the operator may start over.
@@ -253,13 +246,10 @@ class Panel:
         """Show one moment.
 
         Args:
-            status: what the stack says.
             stages: stages with their durations [s], in order.
             factor: robot time per wall time.
             note: a line for the operator; may be empty.
             pressed: whether the e-stop is pressed.
-            paused: whether time stands still.
-            busy: whether a skill runs.
         """
         html = _status_html(status, stages, factor, note, paused, self.legs is not None)
         if html != self._html:

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from golem.errors import ConfigError, MissingExtra
+from golem.errors import ConfigError, needs
 from golem.middleware.web_gate import LOCAL
 from golem.robots.model.table import BASE_LINK
 from golem.robots.mujoco.spectator import SpectatorView
@@ -193,11 +193,9 @@ def serve(host: str, port: int) -> viser.ViserServer:
         ConfigError: the address cannot be had.
         MissingExtra: viser is not installed.
     """
-    try:
+    with needs("", "view"):
         import viser
         import websockets.asyncio.server
-    except ModuleNotFoundError as error:
-        raise MissingExtra(error.name or "viser", "view") from error
     try:
         with socket.socket() as probe:
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

@@ -51,12 +51,7 @@ class StopViewConfig:
 
 
 def run_stop_view(config: StopViewConfig) -> None:
-    """Show it until Ctrl-C.
-
-    Raises:
-        BagError: there is no black box, or it is damaged.
-        ConfigError: it holds no stop, or the port is taken.
-    """
+    """Show it until Ctrl-C. Raises BagError: no black box, or a damaged one; ConfigError: no stop, or port taken."""
     with closing(StopView(read_stop(config.folder), config.port)) as view, interrupted() as ended:
         print(f"{view.stop.status.why}: {view.url} shows it. Ctrl-C ends it.", flush=True)
         view.run(ended)
@@ -69,7 +64,6 @@ class Stop:
     Attributes:
         status: the verdict that stopped the robot.
         times: (n,) when each state came, from the stop on [s].
-        states: what the robot measured.
         commands: what the motors had been told last, or None.
     """
 
@@ -136,11 +130,7 @@ class StopView:
     """Shows one stop; a slider moves through the seconds around it."""
 
     def __init__(self, stop: Stop, port: int) -> None:
-        """Start serving on this machine, at the moment of the stop.
-
-        Raises:
-            ConfigError: the address cannot be had.
-        """
+        """Start serving on this machine, at the moment of the stop. Raises ConfigError: the address cannot be had."""
         self.stop, self._limits = stop, SafetyLimits.from_profile()
         robot = build_robot(load_stack("stand").with_options("robot", world="open"), 0)
         assert isinstance(robot, MujocoRobot)

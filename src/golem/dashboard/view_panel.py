@@ -20,11 +20,7 @@ NOTHING = "nothing"
 
 
 class ViewPanel:
-    """Controls of one server; they move no robot.
-
-    Attributes:
-        record: to be listened to: begins and ends a film.
-    """
+    """Controls of one server; they move no robot. `record` is listened to: it begins and ends a film."""
 
     def __init__(self, server: viser.ViserServer, *, standing: bool) -> None:
         """Add the controls, for a robot that is `standing` or hangs."""

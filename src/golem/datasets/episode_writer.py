@@ -63,14 +63,20 @@ class Video:
 
     def add(self, picture: NDArray[Any]) -> None:
         """Append one picture (height, width, 3)."""
-        self._out.mux(self._stream.encode(self._av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), "rgb24")))
+        self._write(self._av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), "rgb24"))
         for channel in range(3):
             self.counts[channel] += np.bincount(picture[::LOOK, ::LOOK, channel].ravel(), minlength=256)
 
     def finish(self) -> None:
         """Complete the file."""
-        self._out.mux(self._stream.encode())
+        self._write(None)
         self._out.close()
+
+    def _write(self, frame: Any) -> None:
+        """Encode a frame, or what is left, and write it: AV1 is stored in the order in which it is shown."""
+        for packet in self._stream.encode(frame):
+            packet.dts = packet.pts  # a busy encoder's own may go back, which the file refuses
+            self._out.mux(packet)
 
     def drop(self) -> None:
         """Close without completing."""
@@ -79,13 +85,7 @@ class Video:
 
 
 class DatasetWriter:
-    """Records episodes into a data set that is new or goes on.
-
-    Attributes:
-        root: folder of the data set.
-        episodes: how many are in it.
-        length: frames of the episode in the making.
-    """
+    """Records `episodes` into a data set that is new or goes on; `length` counts frames of the one in the making."""
 
     def __init__(self, root: Path, recipe: Recipe, origin: str = "") -> None:
         """Take the data set in `root`, or begin one; `origin` says where it is from.

@@ -18,7 +18,7 @@ import pinocchio as pin
 from golem.capabilities.arms.steps import led
 from golem.capabilities.policies.observer import Observer
 from golem.datasets.sampling import recipe
-from golem.errors import ConfigError, MissingExtra, unknown_name
+from golem.errors import ConfigError, needs, unknown_name
 from golem.robots.model.magpie_model import MAX_GAP
 from golem.robots.mujoco.gl import choose_backend
 from golem.skills.base import SkillResult
@@ -26,11 +26,9 @@ from golem.skills.context import Context
 from golem.skills.served_policy import FORCE
 from golem.types import SIDES, Array, Twist
 
-try:
+with needs("gymnasium", "gym"):
     import gymnasium as gym
     from gymnasium import spaces
-except ModuleNotFoundError as error:
-    raise MissingExtra("gymnasium", "gym") from error
 
 RUNGS = ("tether", "stand", "fridge-tether", "fridge-stand", "counter-tether", "counter-stand")
 """Rungs that are one errand of arms and hands."""

@@ -32,11 +32,7 @@ from golem.types import SIDES, BaseEstimate, HandState, Imu, LowState, PlanarPos
 
 
 def recipe(fps: int, cameras: tuple[str, ...], width: int, depth: bool, masks: tuple[str, ...]) -> Recipe:
-    """Return what is recorded of the cameras called `cameras`, `width` pixels wide; 0 is as wide as they are.
-
-    Raises:
-        ConfigError: there is no such camera or rate.
-    """
+    """Return what is recorded of `cameras`, `width` px wide, 0 for as they are. Raises ConfigError: no such one."""
     for name in cameras:
         if name not in CAMERAS:
             raise unknown_name("camera", name, CAMERAS)
@@ -140,7 +136,6 @@ class MessageRecorder:
         return list(self._take)
 
     def write(self, message: BagMessage) -> None:
-        """Take one message; see `Sink`."""
         while self._next is not None and message.log_time > self._next + SLACK:
             frame = self._sampler.frame()
             if frame is not None:
@@ -179,8 +174,6 @@ def write_bag(frames: Mapping[str, NDArray[Any]], fps: int, path: Path) -> int:
     Args:
         frames: (n, ...) values by feature: `observation.state`, `observation.effort`, and (n, height, width) depths
             with (n, height, width, 3) pictures of cameras, if any.
-        fps: frames per second.
-        path: folder of the bag.
 
     Raises:
         OutputError: it exists already, or cannot be written.

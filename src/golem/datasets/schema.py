@@ -36,11 +36,7 @@ class DatasetError(GolemError):
 
 
 def extra(name: str) -> Any:
-    """Import a module of the extra `data`.
-
-    Raises:
-        MissingExtra: it is not installed.
-    """
+    """Import a module of the extra `data`. Raises MissingExtra: it is not installed."""
     try:
         return importlib.import_module(name)
     except ModuleNotFoundError as error:
@@ -119,7 +115,10 @@ def read_features(info: Mapping[str, Any]) -> dict[str, Feature]:
         names = each.get("names")
         if isinstance(names, dict):  # some data sets group them, as `{"motors": [...]}`
             names = [str(n) for group in names.values() for n in group]
-        out[name] = Feature(each["dtype"], tuple(each["shape"]), names)
+        dtype, shape = str(each["dtype"]), tuple(map(int, each["shape"]))
+        if min(shape) < 1 or (dtype == "video" and len(shape) != 3):
+            raise ValueError(f"{name} has the shape {shape}")
+        out[name] = Feature(dtype, shape, None if names is None else list(names))
     return {name: feature for name, feature in out.items() if name not in INDICES}
 
 

@@ -11,7 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from golem.datasets import schema
 from golem.datasets.schema import ABOUT, DATA, EPISODES, INFO, TASKS, VERSION, DatasetError, extra, read_features
+
+DAMAGE = (ArithmeticError, AttributeError, LookupError, OSError, StopIteration, TypeError, ValueError)
+"""What comes of metadata that says what it cannot."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,9 +50,7 @@ class DatasetFolder:
     """A data set, open for reading.
 
     Attributes:
-        root: its folder.
         info, about: what info.json and golem.json say; the second is empty in a data set of others.
-        fps: frames per second.
         features: by name; `videos` are those that are in videos.
         tasks, episodes: in their order.
     """
@@ -61,7 +63,7 @@ class DatasetFolder:
             MissingExtra: the extra `data` is not installed.
         """
         pq, self.root, self.info = extra("pyarrow.parquet"), root, _read_json(root, INFO)
-        version = self.info.get("codebase_version")
+        version, arrow = self.info.get("codebase_version"), extra("pyarrow").ArrowException
         if version != VERSION:
             raise DatasetError(
                 f"The data set {root} is of LeRobot's version {version}, not {VERSION}; `python -m "
@@ -69,6 +71,10 @@ class DatasetFolder:
             )
         try:
             self.features, self.fps = read_features(self.info), int(self.info["fps"])
+            if self.fps < 1:
+                raise ValueError(f"its fps are {self.fps}")
+            self.info["data_path"] = self.info.get("data_path") or DATA
+            self.videos = [name for name, feature in self.features.items() if feature.is_video]
             files = sorted((root / EPISODES).glob("*/*.parquet"))
             rows = sorted((r for f in files for r in pq.read_table(f).to_pylist()), key=lambda r: r["episode_index"])
             self.episodes = [
@@ -77,10 +83,14 @@ class DatasetFolder:
             tasks = pq.read_table(root / TASKS).to_pydict()
             words = next(v for k, v in tasks.items() if k != "task_index")
             self.tasks = [words[tasks["task_index"].index(k)] for k in range(len(words))]
-        except (KeyError, ValueError, TypeError, OSError, StopIteration, extra("pyarrow").ArrowException) as error:
+            for episode in self.episodes:
+                episode.data_file(self.info["data_path"])
+                for name in self.videos:
+                    float(episode.row[f"videos/{name}/from_timestamp"])
+                    episode.video_file(self.info["video_path"], name)
+        except (*DAMAGE, arrow) as error:
             raise DatasetError(f"The metadata of the data set {root} is damaged: {error!r}.") from error
         self.about = _read_json(root, ABOUT) if (root / ABOUT).exists() else {}
-        self.videos = [name for name, feature in self.features.items() if feature.is_video]
         found, said = len(self.episodes), self.info.get("total_episodes")
         frames, told = sum(episode.length for episode in self.episodes), self.info.get("total_frames")
         if not frames:
@@ -109,30 +119,25 @@ class DatasetFolder:
                 )
 
     def episode(self, index: int) -> RecordedEpisode:
-        """Return one episode.
-
-        Raises:
-            DatasetError: there is none of that number.
-        """
+        """Return one episode. Raises DatasetError: there is none of that number."""
         if not 0 <= index < len(self.episodes):
             raise DatasetError(f"The data set {self.root} has episodes 0 to {len(self.episodes) - 1}, no {index}.")
         return self.episodes[index]
 
     def table(self, episode: RecordedEpisode, columns: Sequence[str] | None = None) -> Any:
-        """Return the frames of an episode as an Arrow table.
-
-        Raises:
-            DatasetError: its file is missing or damaged.
-        """
-        path, only = self.root / episode.data_file(self.info.get("data_path") or DATA), episode.index
+        """Return the frames of an episode as an Arrow table. Raises DatasetError: its file is missing or damaged."""
+        path, only = self.root / episode.data_file(self.info["data_path"]), episode.index
         try:
             table = extra("pyarrow.parquet").read_table(
                 path, columns=None if columns is None else list(columns), filters=[("episode_index", "=", only)]
             )
         except (OSError, ValueError, extra("pyarrow").ArrowException) as error:
-            raise DatasetError(f"The frames of episode {only} cannot be read from {path}: {error}.") from error
+            why = str(error).partition("\n")[0]
+            raise DatasetError(f"The frames of episode {only} cannot be read from {path}: {why}.") from error
         if table.num_rows != episode.length:
             raise DatasetError(f"{path} has {table.num_rows} frames of episode {only}, not {episode.length}.")
+        if absent := [name for name in columns or schema.INDICES if name not in table.column_names]:
+            raise DatasetError(f"{path} has no {absent[0]}; it has {', '.join(table.column_names)}.")
         return table
 
     def values(self, episode: RecordedEpisode, name: str) -> NDArray[Any]:
@@ -141,14 +146,13 @@ class DatasetFolder:
         while hasattr(column.type, "value_type"):
             column = column.flatten()
         shape = self.features[name].shape if name in self.features else (1,)
-        return column.to_numpy(zero_copy_only=False).reshape(episode.length, *(() if shape == (1,) else shape))
+        try:
+            return column.to_numpy(zero_copy_only=False).reshape(episode.length, *(() if shape == (1,) else shape))
+        except ValueError as error:
+            raise DatasetError(f"{name} of episode {episode.index} is not {shape}, as info.json says.") from error
 
     def pictures(self, episode: RecordedEpisode, name: str) -> Iterator[NDArray[np.uint8]]:
-        """Yield the pictures (height, width, 3) of one video of an episode, in order.
-
-        Raises:
-            DatasetError: the video is missing, damaged, or ends too early.
-        """
+        """Yield the pictures (height, width, 3) of an episode's video, in order. Raises DatasetError: it is damaged."""
         path, av = self.root / episode.video_file(self.info["video_path"], name), extra("av")
         first, count = float(episode.row[f"videos/{name}/from_timestamp"]), 0
         try:
@@ -158,7 +162,7 @@ class DatasetFolder:
                     if count < episode.length and (frame.time is None or frame.time > first - 0.5 / self.fps):
                         count += 1
                         yield frame.to_ndarray(format="rgb24")
-        except (OSError, av.FFmpegError) as error:
+        except (OSError, IndexError, av.FFmpegError) as error:
             raise DatasetError(f"The video {path} of episode {episode.index} cannot be read: {error}.") from error
         if count < episode.length:
             raise DatasetError(f"The video {path} ends after {count} of the {episode.length} frames of its episode.")
@@ -167,7 +171,7 @@ class DatasetFolder:
 def _read_json(root: Path, name: str) -> dict[str, Any]:
     path = root / name
     try:
-        value = json.loads(path.read_text(encoding="utf-8"))
-        return {**value}
+        return {**json.loads(path.read_text(encoding="utf-8"))}
     except (OSError, ValueError, TypeError) as error:
-        raise DatasetError(f"{root} is no data set of LeRobot's: {path} cannot be read ({error}).") from error
+        why = getattr(error, "strerror", None) or error
+        raise DatasetError(f"{root} is no data set of LeRobot's: {path} cannot be read ({why}).") from error

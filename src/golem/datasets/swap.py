@@ -50,11 +50,7 @@ def beside(root: Path, name: str) -> Path:
 
 @contextmanager
 def replaced(root: Path) -> Iterator[Path]:
-    """Yield an empty folder that takes the place of `root` once all is well; else `root` stays as it is.
-
-    Raises:
-        OutputError: something cannot be written.
-    """
+    """Yield an empty folder that replaces `root` once all is well. Raises OutputError: something cannot be written."""
     new = beside(root, "new")
     try:
         new.mkdir(parents=True)

@@ -42,9 +42,6 @@ class TrialSpec:
     """One trial: everything that may influence its outcome.
 
     Attributes:
-        rung: name of the rung.
-        method: name of the method under test.
-        profile: realism profile of sensors and world.
         seed: seed of the whole ladder, >= 0.
         index: number of the trial, >= 0; trials with equal (seed, index) see the same scene whatever the method.
         overrides: stack slot -> implementation that replaces the rung's own choice.
@@ -106,7 +103,6 @@ class TrialOutcome:
     costs: Mapping[str, float] = field(default_factory=dict[str, float])
 
     def __post_init__(self) -> None:
-        """Refuse an outcome that contradicts itself."""
         if self.success != (self.stage == DONE):
             raise ValueError(f"success={self.success} contradicts stage={self.stage!r}")
         if self.success and self.module is not None:
@@ -140,14 +136,12 @@ class Rung(ABC, Generic[O]):
     Attributes:
         name: the name it is registered under.
         Options: dataclass of its own options, with defaults and docstrings; they become options of the command.
-        profiles: realism profiles it can run with.
         default_methods, default_n, default_profile: what is compared where the command does not say.
         adaptive: whether the cases are the result: levels of a search, which depend on results, or variants of a stack.
             Elsewhere they are conditions under which methods are compared.
         provokes: whether it shoves or harms robots until they are lost, so that a stop may be right.
         timed: whether it measures the machine, so that nothing may run at the same time as a trial.
         slot: what its methods are, where they are modules.
-        options: the options of this one.
         varied: word of a case -> the option that has its values, or these.
         onlooker: who is shown the stacks of its trials: a viewer, or on a ladder what films the lost ones.
     """
@@ -165,11 +159,7 @@ class Rung(ABC, Generic[O]):
     varied: ClassVar[Mapping[str, str | Sequence[Any]]] = {}
 
     def __init__(self, options: O | None = None) -> None:
-        """Take the options; None are the defaults.
-
-        Raises:
-            golem.errors.ConfigError: one says nothing this rung can do.
-        """
+        """Take the options; None are the defaults. Raises ConfigError: one says nothing this rung can do."""
         self.options: O = self.Options() if options is None else options
         self.onlooker: Onlooker | None = None
 
@@ -193,7 +183,6 @@ class Rung(ABC, Generic[O]):
         """Run one trial; a rung has this, or `run_together`, of its own.
 
         Args:
-            spec: the trial.
             artefacts: folder for what should be kept in addition to the record; it exists only if the rung makes it.
                 None keeps nothing.
 
@@ -230,11 +219,7 @@ class Rung(ABC, Generic[O]):
 
 
 def rung_class(name: str) -> type[Rung[Any]]:
-    """Import the rung called `name`.
-
-    Raises:
-        golem.errors.ConfigError: there is no such rung.
-    """
+    """Import the rung called `name`. Raises ConfigError: there is no such rung."""
     if name not in RUNGS:
         raise unknown_name("rung", name, RUNGS)
     return _load(RUNGS[name])

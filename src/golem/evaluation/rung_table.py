@@ -20,11 +20,7 @@ _NUMBERS = {"-n": int, "--n": int, "-j": int, "--j": int, "--seed": int, "--limi
 
 
 def refuse_early(words: Sequence[str]) -> None:
-    """Refuse words of `golem ladder` whose rung, methods, profile or numbers cannot be.
-
-    Raises:
-        ConfigError: about the first that cannot.
-    """
+    """Refuse words of `golem ladder`. Raises ConfigError: a rung, method, profile or number that cannot be."""
     given: dict[str, list[str]] = {}
     option = ""
     for word in words:

@@ -112,16 +112,14 @@ _POINT_TYPES = {"i1": 1, "u1": 2, "i2": 3, "u2": 4, "i4": 5, "u4": 6, "f4": 7, "
 def color_image(t: float, rgb: NDArray[np.uint8], frame: str) -> Image:
     """Return a colour image (height, width, 3), exposed at `t` [s]."""
     height, width, _ = rgb.shape
-    data = np.ascontiguousarray(rgb).reshape(-1)
-    return Image(header(t, frame), height, width, "rgb8", 0, 3 * width, data)
+    return Image(header(t, frame), height, width, "rgb8", 0, 3 * width, np.ascontiguousarray(rgb).reshape(-1))
 
 
 def color_jpeg(t: float, rgb: NDArray[np.uint8], frame: str) -> CompressedImage:
     """Return a colour image (height, width, 3) as JPEG."""
     import cv2
 
-    bgr = cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR)
-    _, data = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+    _, data = cv2.imencode(".jpg", cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
     return CompressedImage(header(t, frame), COLOR_FORMAT, data.reshape(-1))
 
 
@@ -198,21 +196,12 @@ def to_camera(message: CameraInfo, name: str, near: float, far: float, rate: flo
 
 
 def to_rgb(message: Image) -> NDArray[np.uint8]:
-    """Return a colour image (height, width, 3).
-
-    Raises:
-        CodecError: it is not rgb8, or has not as many bytes as it says.
-    """
-    pixels = _rows(message, "rgb8", 3)
-    return np.ascontiguousarray(pixels).reshape(message.height, message.width, 3)
+    """Return a colour image (height, width, 3). Raises CodecError: it is not rgb8, or has other bytes than it says."""
+    return np.ascontiguousarray(_rows(message, "rgb8", 3)).reshape(message.height, message.width, 3)
 
 
 def to_depth(message: Image) -> NDArray[np.float32]:
-    """Return a depth image (height, width) [m].
-
-    Raises:
-        CodecError: it is not 16UC1, or has not as many bytes as it says.
-    """
+    """Return a depth image (height, width) [m]. Raises CodecError: it is not 16UC1, or has other bytes than it says."""
     pixels = np.ascontiguousarray(_rows(message, "16UC1", 2))
     order = ">u2" if message.is_bigendian else "<u2"
     return pixels.view(order).astype(np.float32) * np.float32(0.001)

@@ -34,11 +34,7 @@ def cloud(scan: LidarScan) -> PointCloud2:
 
 
 def to_scan(message: PointCloud2) -> LidarScan:
-    """Return the scan in a cloud of the vendor's driver.
-
-    Raises:
-        CodecError: it lacks a field, or contradicts itself.
-    """
+    """Return the scan in a cloud of the vendor's driver. Raises CodecError: it lacks a field, or contradicts itself."""
     points = images.to_points(message)
     names = points.dtype.names or ()
     missing = [name for name in ("x", "y", "z", "timestamp") if name not in names]
@@ -89,11 +85,7 @@ def odometry(said: ExternalOdometry) -> Odometry:
 
 
 def to_odometry(message: Odometry) -> ExternalOdometry:
-    """Return what an odometry outside of this stack says.
-
-    Raises:
-        CodecError: its pose is none.
-    """
+    """Return what an odometry outside of this stack says. Raises CodecError: its pose is none."""
     twist = message.twist.twist
     covariance: NDArray[np.float64] = np.array(message.pose.covariance, dtype=np.float64).reshape(6, 6)
     return ExternalOdometry(

@@ -60,12 +60,7 @@ class RememberedPlaces:
 
 @dataclass(frozen=True, slots=True)
 class ShownPicture:
-    """A picture for people.
-
-    Attributes:
-        t: time [s].
-        rgb: (height, width, 3) uint8.
-    """
+    """A picture (height, width, 3) uint8 for people, of the time `t` [s]."""
 
     t: float
     rgb: NDArray[np.uint8]

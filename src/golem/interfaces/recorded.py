@@ -12,11 +12,7 @@ COMPRESSED = "sensor_msgs/msg/CompressedImage"
 
 
 def public_topics(chosen: Collection[str] = ()) -> list[BagTopic]:
-    """Return the public topics among `chosen`; default: all, but images in one form only: as they are.
-
-    Raises:
-        MissingExtra: as for `topic`.
-    """
+    """Return the public topics among `chosen`; default: all, images as they are. Raises MissingExtra: as `topic`."""
     rows = {row.name: row for row in public.TOPICS}
     wanted = chosen or [name for name, row in rows.items() if row.type != COMPRESSED]
     return [topic(name, rows[name].type, rows[name].qos) for name in dict.fromkeys(wanted) if name in rows]

@@ -30,11 +30,7 @@ gyro's noise and zero]."""
 
 
 def time(t: float) -> Time:
-    """Return `t` [s] as a ROS time.
-
-    Raises:
-        CodecError: it is not finite or does not fit into 32 bits.
-    """
+    """Return `t` [s] as a ROS time. Raises CodecError: it is not finite or does not fit into 32 bits."""
     return Time(*_sec_nanosec(t))
 
 
@@ -73,11 +69,7 @@ def pose(T: Array) -> geometry_msgs.Pose:
 
 
 def matrix(pose: geometry_msgs.Pose) -> Array:
-    """Return a pose as (4, 4); the quaternion need not have length one.
-
-    Raises:
-        CodecError: a number is not finite, or the quaternion is zero or absurdly large.
-    """
+    """Return a pose as (4, 4), its quaternion of any length. Raises CodecError: not finite, or no quaternion."""
     p, q = pose.position, pose.orientation
     numbers = np.array([p.x, p.y, p.z, q.x, q.y, q.z, q.w])
     if not np.isfinite(numbers).all() or not 1e-6 < np.abs(numbers[3:]).max() < 1e6:
@@ -95,13 +87,7 @@ def transform_matrix(transform: geometry_msgs.Transform) -> Array:
 
 
 def transforms(t: float, links: Sequence[tuple[str, str]], T_parent_child: Array) -> TFMessage:
-    """Return poses of frames for /tf.
-
-    Args:
-        t: time [s].
-        links: parent and child of each of n poses.
-        T_parent_child: (n, 4, 4) pose of each child in its parent.
-    """
+    """Return poses (n, 4, 4) at `t` [s] of children in parents, the `links`, for /tf."""
     positions, rotations = T_parent_child[:, :3, 3].tolist(), map(_xyzw, T_parent_child.tolist())
     stamp = time(t)
     return TFMessage(
@@ -155,12 +141,7 @@ def to_twist(message: geometry_msgs.Twist) -> Twist:
 
 
 def odometry(estimate: BaseEstimate, rate: Array) -> Odometry:
-    """Return the base's pose in odom and its velocity in base_link.
-
-    Args:
-        estimate: of the base.
-        rate: (3,) angular velocity of base_link in base_link [rad/s].
-    """
+    """Return the base's pose in odom and velocity in base_link; `rate` (3,) is angular, in base_link [rad/s]."""
     message = Odometry(header(estimate.t, "odom"), "base_link")
     message.pose.pose = pose(estimate.T_odom_base)
     message.twist.twist.linear = vector(estimate.T_odom_base[:3, :3].T @ estimate.velocity)
@@ -208,11 +189,7 @@ def base_estimate(estimate: BaseEstimate) -> golem_interfaces.BaseEstimate:
 
 
 def to_base_estimate(message: golem_interfaces.BaseEstimate) -> BaseEstimate:
-    """Return an estimate of the base.
-
-    Raises:
-        CodecError: its pose is none.
-    """
+    """Return an estimate of the base. Raises CodecError: its pose is none."""
     v = message.velocity
     return BaseEstimate(
         seconds(message.header.stamp),
@@ -235,11 +212,7 @@ def hand_state(state: HandState, side: str) -> golem_interfaces.HandState:
 
 
 def to_hand_state(message: golem_interfaces.HandState) -> HandState:
-    """Return what one hand reports.
-
-    Raises:
-        CodecError: gap, a finger or a force is not finite.
-    """
+    """Return what one hand reports. Raises CodecError: gap, a finger or a force is not finite."""
     fingers, force = np.array(message.fingers), np.array(message.force)
     if not np.isfinite([message.gap, *fingers, *force]).all():
         raise CodecError(f"A hand reports a gap of {message.gap} m, fingers at {fingers}, forces of {force} N.")
@@ -253,11 +226,7 @@ def hand_command(command: HandCommand, side: str) -> golem_interfaces.HandComman
 
 
 def to_hand_command(message: golem_interfaces.HandCommand) -> HandCommand:
-    """Return what one hand is told.
-
-    Raises:
-        CodecError: gap or force is not finite.
-    """
+    """Return what one hand is told. Raises CodecError: gap or force is not finite."""
     if not (math.isfinite(message.gap) and math.isfinite(message.force)):
         raise CodecError(f"The hand is told a gap of {message.gap} m and a force of {message.force} N.")
     return HandCommand(seconds(message.header.stamp), message.gap, message.force)
@@ -272,20 +241,11 @@ def hand_status(status: HandStatus, side: str) -> golem_interfaces.HandStatus:
 def leg_status(status: LegStatus) -> golem_interfaces.LegStatus:
     """Return what the lower body does."""
     return golem_interfaces.LegStatus(
-        header(status.t, "base_link"),
-        twist(status.commanded),
-        twist(status.applied),
-        cmd_height(status.commanded).data,
-        math.nan if status.height is None else status.height,
-        bool(status.clamped),
-        status.reason,
-        bool(status.stepping),
-        bool(status.moving),
-        pose(status.rest.matrix()),
-        np.array(status.phase, np.float64),
-        status.controller,
-        status.fault or "",
-    )
+        header(status.t, "base_link"), twist(status.commanded), twist(status.applied),
+        cmd_height(status.commanded).data, math.nan if status.height is None else status.height, bool(status.clamped),
+        status.reason, bool(status.stepping), bool(status.moving), pose(status.rest.matrix()),
+        np.array(status.phase, np.float64), status.controller, status.fault or "",
+    )  # fmt: skip
 
 
 def sightings(seen: Detections) -> golem_interfaces.Sightings:
@@ -378,8 +338,7 @@ def to_occupancy_grid(message: nav_msgs.OccupancyGrid) -> OccupancyGrid:
 
 def path(way: NavPath) -> nav_msgs.Path:
     """Return a way; each pose heads to the next."""
-    steps = np.diff(way.points, axis=0)
-    headings = [math.atan2(y, x) for x, y in steps.tolist()]
+    headings = [math.atan2(y, x) for x, y in np.diff(way.points, axis=0).tolist()]
     headings += headings[-1:] or [0.0]
     stamp = header(way.t, way.frame)
     poses = [

@@ -70,13 +70,7 @@ class TopicRow:
 
 @dataclass(frozen=True, slots=True)
 class ServiceRow:
-    """A call with an answer.
-
-    Attributes:
-        name, type: in ROS 2.
-        by: who answers.
-        text: what it does.
-    """
+    """A call with an answer: its name and type in ROS 2, who answers, and what it does."""
 
     name: str
     type: str
@@ -86,13 +80,7 @@ class ServiceRow:
 
 @dataclass(frozen=True, slots=True)
 class ActionRow:
-    """A goal with feedback, a result, and a way to cancel it.
-
-    Attributes:
-        name, type: in ROS 2.
-        by: who pursues it.
-        text: what it does.
-    """
+    """A goal with feedback, a result, and a way to cancel it: see `ServiceRow`."""
 
     name: str
     type: str

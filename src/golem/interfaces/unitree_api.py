@@ -98,31 +98,19 @@ LOCO_API = "h1"
 
 
 def loco_api(robot: object) -> LocoApi:
-    """Return the loco service of `robot`, a name in `LOCO_APIS`.
-
-    Raises:
-        ConfigError: there is none of that name.
-    """
+    """Return the loco service of `robot`, a name in `LOCO_APIS`. Raises ConfigError: there is none of that name."""
     if not isinstance(robot, str) or robot not in LOCO_APIS:
         raise unknown_name("robot with a loco service", str(robot), LOCO_APIS)
     return LOCO_APIS[robot]
 
 
 def encode(values: Mapping[str, object]) -> str:
-    """Return a JSON payload.
-
-    Raises:
-        ValueError: a number is NaN or infinite, which JSON cannot say.
-    """
+    """Return a JSON payload. Raises ValueError: a number is NaN or infinite, which JSON cannot say."""
     return json.dumps(values, allow_nan=False)
 
 
 def decode(payload: str) -> dict[str, object]:
-    """Return the values of a JSON payload; an empty payload has none.
-
-    Raises:
-        ValueError: it is no JSON object.
-    """
+    """Return the values of a JSON payload; an empty payload has none. Raises ValueError: it is no JSON object."""
     try:
         values = json.loads(payload or "{}", parse_constant=_refuse)
     except RecursionError as error:
@@ -133,11 +121,7 @@ def decode(payload: str) -> dict[str, object]:
 
 
 def decode_int(payload: str) -> int:
-    """Return the integer `data` of a payload.
-
-    Raises:
-        ValueError: there is none.
-    """
+    """Return the integer `data` of a payload. Raises ValueError: there is none."""
     value = decode(payload).get("data")
     if not isinstance(value, int) or isinstance(value, bool):
         raise ValueError(f"'data' is an integer, not {value!r:.60}")

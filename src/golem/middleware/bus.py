@@ -24,12 +24,7 @@ class WrongType(GolemError):
 
 @dataclass(frozen=True, slots=True)
 class Topic(Generic[T]):
-    """The key of one stream.
-
-    Attributes:
-        name: of the stream; one name has one kind.
-        kind: class of its values.
-    """
+    """The key of one stream, whose values are of the class `kind`; one name has one kind."""
 
     name: str
     kind: type[T]
@@ -53,11 +48,7 @@ class Deferred(Generic[T]):
 
 
 class Waker(Protocol):
-    """Who is to be told that a topic has news.
-
-    Attributes:
-        woken: set to true whenever it has.
-    """
+    """Who is to be told that a topic has news: `woken` is set to true whenever it has."""
 
     woken: bool
 
@@ -121,11 +112,7 @@ class Bus:
         self._pending.pop(topic.name, None)
 
     def deliver(self, t: float, besides: Container[str] = ()) -> bool:
-        """Make every value that is due at time `t` visible, once per tick.
-
-        Returns:
-            Whether there was one, `besides` those on topics of these names.
-        """
+        """Make every value due at `t` visible, once per tick; return whether one is on a topic not in `besides`."""
         some = False
         for name, queue in self._pending.items():
             # Half a microsecond of slack: ticks are sums of binary fractions.

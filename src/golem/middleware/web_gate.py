@@ -35,28 +35,23 @@ PENDING = 64
 """Connections whose heads are waited for at once; a further one ends the oldest."""
 
 
-class Relay(ABC):
-    """Relays connections to a server on this machine, those whose first request it admits.
+def listen(host: str, port: int) -> socket.socket:
+    """Return a socket that listens at `host` and `port`, 0 for a free one. Raises ConfigError: it cannot be had."""
+    try:
+        return socket.create_server((host, port), family=socket.AF_INET6 if ":" in host else socket.AF_INET)
+    except (OSError, OverflowError) as error:
+        raise ConfigError(f"Cannot listen on {host}:{port} ({error}); choose another port or host.") from error
 
-    Attributes:
-        port: on which it listens.
-    """
+
+class Relay(ABC):
+    """Relays connections to a server on this machine, those whose first request it admits."""
 
     refusal = ""
     """What whoever is not admitted is told."""
 
     def __init__(self, host: str, port: int, server: tuple[str, int]) -> None:
-        """Listen at `host` and `port` (0 takes a free one) for the server at an address of this machine.
-
-        Raises:
-            ConfigError: the address cannot be had.
-        """
-        self._server = server
-        try:
-            family = socket.AF_INET6 if ":" in host else socket.AF_INET
-            self._listener = socket.create_server((host, port), family=family)
-        except (OSError, OverflowError) as error:
-            raise ConfigError(f"Cannot listen on {host}:{port} ({error}); choose another port or host.") from error
+        """Listen at `host` and `port` (0: a free one) for a server of this machine. Raises ConfigError: it is taken."""
+        self._server, self._listener = server, listen(host, port)
         self.port = int(self._listener.getsockname()[1])
         self._open: set[socket.socket] = set()
         self._lock = threading.Lock()
@@ -107,8 +102,7 @@ class Relay(ABC):
                 back.start()
                 greeting = self.greeting(head)
                 if greeting:
-                    answer = _head(inner)
-                    first, end, rest = answer.partition(b"\r\n")
+                    first, end, rest = _head(inner).partition(b"\r\n")
                     outer.sendall(first + end + (greeting if end else b"") + rest)
                 _pump(inner, outer)
                 back.join()
@@ -261,11 +255,7 @@ def is_loopback(host: str) -> bool:
 
 
 class TokenGate(Relay):
-    """Relays connections to a server on this machine once they have shown the token.
-
-    Attributes:
-        token: what has to be shown.
-    """
+    """Relays connections to a server on this machine once they have shown the token."""
 
     refusal = "Open the address that GOLEM has printed: it ends with the token."
 

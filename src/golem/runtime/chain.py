@@ -30,9 +30,6 @@ class Link:
 
     Attributes:
         node: the node, whose `step` does the ticks that are not ordinary.
-        stage: its compiled part.
-        reads: topics that it reads.
-        writes: topics that it publishes.
         prepare: called with the time [s] before the stage runs; returns whether it may. None: it always may.
         passed: called with the number of ticks that it has run; None where nobody counts.
     """
@@ -81,12 +78,7 @@ class _Segment:
 
 
 class NativeChain:
-    """Runs links; see `executor.Chain`.
-
-    Attributes:
-        members: the nodes of the links, in their order.
-        hears: commands; see `Chain`.
-    """
+    """Runs links, whose nodes are `members`, in their order; see `executor.Chain`."""
 
     hears = frozenset((topics.LEG_COMMAND.name, topics.ARM_COMMAND.name))
 
@@ -114,7 +106,6 @@ class NativeChain:
         return last
 
     def run(self, t: float, first: int, last: int) -> None:
-        """Let the members from `first` up to `last` have their turns of the tick at `t` [s]; see `Chain`."""
         at = first
         while at < last:
             at, _ = self._run(t, 0, 0.0, at, self._ready(t, at, last), 1)
@@ -123,7 +114,6 @@ class NativeChain:
                 at += 1
 
     def run_ticks(self, tick: int, offset: float, ticks: int) -> int:
-        """Let all members have their turns of up to so many ticks; see `Chain`."""
         t, last = offset + tick * TICK, len(self._links)
         if self._ready(t, 0, last) < last:
             self.run(t, 0, last)
@@ -137,11 +127,7 @@ class NativeChain:
         return done + 1
 
     def _run(self, t: float, tick: int, offset: float, first: int, last: int, ticks: int) -> tuple[int, int]:
-        """Run the stages from `first` up to `last` for so many ticks, or until one is not ordinary.
-
-        Returns:
-            Which stage has not done the tick, `last` where all have, and how many whole ticks have passed.
-        """
+        """Run stages from `first` to `last` until one is not ordinary; return it, else `last`, and the whole ticks."""
         if first == last:
             return last, 0
         bus, segment = self._bus, self._segments[first, last]

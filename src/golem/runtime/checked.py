@@ -26,18 +26,13 @@ T = TypeVar("T")
 
 
 class CheckedGraspMethod:
-    """A `GraspMethod` whose faults name the module.
-
-    Attributes:
-        latency: see `GraspMethod`.
-    """
+    """A `GraspMethod` whose faults name the module."""
 
     def __init__(self, method: GraspMethod, contract: ContractCheck) -> None:
         self._method, self._contract = method, contract
         self.latency = contract.number("latency", method.latency, minimum=0.0)
 
     def propose(self, target: LocalizedObject, scene: Array, gripper: Gripper) -> list[Grasp]:
-        """Return the method's grasps; see `GraspMethod`."""
         grasps = self._contract.call(lambda: list(self._method.propose(target, scene, gripper)))
         for grasp in grasps:
             self._contract.kind("a proposal", grasp, Grasp)
@@ -47,7 +42,6 @@ class CheckedGraspMethod:
         return grasps
 
     def servo(self, target: LocalizedObject, grasp: Grasp, t: float) -> ServoLaw | None:
-        """Return the method's law, guarded; see `GraspMethod`."""
         law = self._contract.call(self._method.servo, target, grasp, t)
         if law is None:
             return None
@@ -66,7 +60,6 @@ class CheckedServoLaw:
         self.patience = contract.number("patience", law.patience, minimum=0.0)
 
     def step(self, t: float, sightings: list[LocalizedObject] | None, T_odom_gripper: Array) -> ServoStep:
-        """Return the law's step; see `ServoLaw`."""
         step = self._contract.call(self._law.step, t, sightings, T_odom_gripper)
         self._contract.kind("the servo step", step, ServoStep)
         self._contract.kind("status", step.status, ServoStatus)
@@ -87,23 +80,17 @@ class CheckedSeeingLaw(CheckedServoLaw):
     def see(
         self, t: float, side: Side, T_odom_base: Array, observe: Callable[[], dict[str, Any] | None], live: bool
     ) -> None:
-        """Let it look; see `SeeingLaw`."""
         self._contract.call(self._see, t, side, T_odom_base, observe, live)
 
 
 class CheckedPlanner:
-    """An `ArmPlanner` whose faults name the module; what it refuses goes further as it is.
-
-    Attributes:
-        latency: see `ArmPlanner`.
-    """
+    """An `ArmPlanner` whose faults name the module; what it refuses goes further as it is."""
 
     def __init__(self, planner: ArmPlanner, contract: ContractCheck) -> None:
         self._planner, self._contract = planner, contract
         self.latency = contract.number("latency", planner.latency, minimum=0.0)
 
     def plan(self, request: PlanRequest) -> Plan:
-        """Return the planner's trajectory; see `ArmPlanner`."""
         plan = passing(self._contract, PlanRefused, lambda: self._planner.plan(request))
         self._contract.kind("the plan", plan, Plan)
         n = len(self._contract.array("times", plan.times, *np.shape(plan.times)))
@@ -114,43 +101,31 @@ class CheckedPlanner:
 
 
 class CheckedProperties:
-    """A `PropertySource` whose faults name the module; a name that it does not know is the user's error.
-
-    Attributes:
-        latency: see `PropertySource`.
-    """
+    """A `PropertySource` whose faults name the module; a name that it does not know is the user's error."""
 
     def __init__(self, source: PropertySource, contract: ContractCheck) -> None:
         self._source, self._contract = source, contract
         self.latency = contract.number("latency", source.latency, minimum=0.0)
 
     def properties(self, label: str) -> Properties:
-        """Return what the source says; see `PropertySource`."""
         said = passing(self._contract, ConfigError, lambda: self._source.properties(label))
         return self._contract.kind("what it says", said, Properties)
 
 
 class CheckedMemory:
-    """A `Memory` whose faults name the module; what it refuses goes further as it is. Threads take turns.
-
-    Attributes:
-        last: see `Memory`.
-    """
+    """A `Memory` whose faults name the module; what it refuses goes further as it is. Threads take turns."""
 
     def __init__(self, memory: Memory, contract: ContractCheck) -> None:
         self._memory, self._contract, self._turn = memory, contract, threading.Lock()
 
     @property
     def last(self) -> float:
-        """Time of the newest look [s]; see `Memory`."""
         return float(self._contract.kind("last", self._memory.last, float))
 
     def observe(self, observation: Observation) -> None:
-        """Take a look in; see `Memory`."""
         self._ask(lambda: self._memory.observe(observation))
 
     def query(self, text: str, when: When = "now", at: float | None = None, limit: int = 5) -> list[Place]:
-        """Return places; see `Memory`."""
         places = self._ask(lambda: list(self._memory.query(text, when, at, limit)))
         for place in places:
             check_place(self._contract, place)
@@ -165,11 +140,9 @@ class CheckedMemory:
         return places
 
     def forget(self, text: str) -> int:
-        """Forget places; see `Memory`."""
         return self._contract.kind("the count", self._ask(lambda: self._memory.forget(text)), int)
 
     def close(self) -> None:
-        """Let go of files; see `Memory`."""
         self._ask(self._memory.close)
 
     def _ask(self, call: Callable[[], T]) -> T:
@@ -178,11 +151,7 @@ class CheckedMemory:
 
 
 def check_place(contract: ContractCheck, place: object) -> None:
-    """Check one answer of a memory.
-
-    Raises:
-        ModuleFault: it is none.
-    """
+    """Check one answer of a memory. Raises ModuleFault: it is none."""
     found = contract.kind("a place", place, Place)
     contract.kind("label", found.label, str)
     contract.array("position", found.position, 3)
@@ -195,12 +164,7 @@ def check_place(contract: ContractCheck, place: object) -> None:
 
 
 def passing(contract: ContractCheck, refusal: type[Exception], call: Callable[[], T]) -> T:
-    """Return `call()` of a module that `contract` watches.
-
-    Raises:
-        refusal: it raised that, as its contract allows.
-        ModuleFault: it raised anything else.
-    """
+    """Return `call()` of a module. Raises `refusal`, as its contract allows; ModuleFault: it raised anything else."""
     refused: list[Exception] = []
 
     def ask() -> T | None:
@@ -217,11 +181,7 @@ def passing(contract: ContractCheck, refusal: type[Exception], call: Callable[[]
 
 
 class CheckedNavigator:
-    """A `Navigator` whose faults name the module.
-
-    Attributes:
-        rate, latency: see `Navigator`.
-    """
+    """A `Navigator` whose faults name the module."""
 
     def __init__(self, navigator: Navigator, contract: ContractCheck) -> None:
         self._navigator, self._contract = navigator, contract
@@ -229,11 +189,9 @@ class CheckedNavigator:
         self.latency = contract.number("latency", navigator.latency, minimum=0.0)
 
     def start(self, goal: PlanarPose) -> None:
-        """Give the navigator its goal; see `Navigator`."""
         self._contract.call(self._navigator.start, goal)
 
     def step(self, inputs: NavInputs, dt: float) -> NavStep:
-        """Return the navigator's step; see `Navigator`."""
         step = self._contract.call(self._navigator.step, inputs, dt)
         self._contract.kind("the step", step, NavStep)
         self._contract.kind("twist", step.twist, Twist)

@@ -33,11 +33,7 @@ MIN_SLOW, MAX_SLOW_RATIO = 5, 0.2
 
 
 class CallTimes:
-    """Samples the calls of one module.
-
-    Attributes:
-        allowed: time that a call may take [s]: its period, and the latency it declares. Infinite: none is measured.
-    """
+    """Samples the calls of a module; `allowed` [s] is its period and latency, or infinite: none is measured."""
 
     def __init__(self) -> None:
         self.allowed = math.inf
@@ -75,13 +71,7 @@ _FLOAT = np.dtype(np.float64)
 
 @dataclass(frozen=True)
 class ContractCheck:
-    """Watches one module of the stack.
-
-    Attributes:
-        slot: its slot.
-        use: the implementation as the stack file names it.
-        times: what its calls take.
-    """
+    """Watches one module of the stack; `use` is the implementation as the stack file names it."""
 
     slot: str
     use: str
@@ -123,21 +113,13 @@ class ContractCheck:
                 self.times.stop(started, f"{self.slot}: {self.use}")
 
     def kind(self, name: str, value: object, kind: type[T]) -> T:
-        """Return `value`, which is called `name` and must be a `kind`.
-
-        Raises:
-            ModuleFault: it is something else.
-        """
+        """Return `value`, which is called `name` and must be a `kind`. Raises ModuleFault: it is something else."""
         if not isinstance(value, kind):
             raise self.fault(f"{name} is a {type(value).__name__}, the contract asks for a {kind.__name__}")
         return value
 
     def number(self, name: str, value: object, minimum: float = -math.inf) -> float:
-        """Return `value`, which is called `name` and must be a finite number of at least `minimum`.
-
-        Raises:
-            ModuleFault: it is something else.
-        """
+        """Return `value`, called `name`, a finite number of at least `minimum`. Raises ModuleFault: it is none."""
         if type(value) is float and minimum <= value and -math.inf < value < math.inf:
             return value
         if not isinstance(value, numbers.Real) or not math.isfinite(value) or value < minimum:
@@ -146,11 +128,7 @@ class ContractCheck:
         return float(value)
 
     def array(self, name: str, value: object, *shape: int | None) -> Array:
-        """Return `value`, which is called `name` and must be a finite array of numbers of `shape`; None is any length.
-
-        Raises:
-            ModuleFault: it is something else.
-        """
+        """Return `value`, called `name`, a finite array of `shape`, None being any. Raises ModuleFault: it is none."""
         if not isinstance(value, np.ndarray) or value.dtype.kind not in "fiu":
             kind = f"array of {value.dtype}" if isinstance(value, np.ndarray) else type(value).__name__
             raise self.fault(f"{name} is a {kind}, the contract asks for an array of numbers")
@@ -163,11 +141,7 @@ class ContractCheck:
         return value
 
     def arrays(self, length: int, **values: object) -> None:
-        """Check that all `values` are arrays as `array` asks for, (length,) each; for ordinary ones in one go.
-
-        Raises:
-            ModuleFault: one is something else.
-        """
+        """Check that `values` are arrays of (length,), ordinary ones in one go. Raises ModuleFault: one is none."""
         total = 0.0
         for name in values:
             value = values[name]

@@ -25,12 +25,7 @@ class EstopCheckConfig:
 
 
 class EstopReport:
-    """What an e-stop has said since it was listened to.
-
-    Attributes:
-        pressed: whether it was ever pressed.
-        released: whether it was ever released.
-    """
+    """What an e-stop has said since it was listened to."""
 
     def __init__(self) -> None:
         self.pressed = self.released = False
@@ -64,17 +59,12 @@ class EstopReport:
 
 
 def run_estop_check(config: EstopCheckConfig) -> bool:
-    """Listen until Ctrl-C; return whether it was pressed and released meanwhile.
-
-    Raises:
-        MissingExtra, PortError: the port cannot be opened.
-    """
+    """Listen until Ctrl-C; return whether it was pressed and released. Raises MissingExtra, PortError: no port."""
     report = EstopReport()
     with closing(SerialEstop(config.port)) as estop, interrupted() as stop:
         while not stop.wait(TICK):
             t = time.monotonic()
-            frame = estop.step(t)
-            news = report.add(t, frame, estop.fault)
+            news = report.add(t, estop.step(t), estop.fault)
             if news:
                 log_line(news)
         log_line(report.summary(estop))

@@ -24,7 +24,6 @@ def parse_goal(spec: SkillSpec, words: list[str], prog: str, taken: Collection[s
     `1 -0.5 --frame odom`.
 
     Args:
-        spec: the skill.
         words: the rest of the command line.
         prog: what stands before them, for the help.
         taken: options that the command itself has.

@@ -36,12 +36,7 @@ from golem.types import LEGS, NUM_JOINTS, UPPER, Array, Side
 
 
 class LockstepRunner:
-    """A stack in execution.
-
-    Attributes:
-        executor: the clock.
-        estop: the virtual emergency stop, to be pressed.
-    """
+    """A stack in execution; `estop` is the virtual emergency stop, to be pressed."""
 
     def __init__(self, stack: Stack, robot: Robot, limits: SafetyLimits | None = None) -> None:
         """Wire the modules of `stack` to `robot`.
@@ -207,10 +202,7 @@ def build_robot(stack: Stack, seed: int) -> Any:
 
 
 def build(stack: Stack, seed: int, limits: SafetyLimits | None = None) -> tuple[LockstepRunner, Any]:
-    """Build the robot of `stack` for episode `seed`, and the stack around it; `limits` as in `LockstepRunner`.
-
-    Returns:
-        The running stack, and the robot: for evaluation and viewers, never for modules.
+    """Return `stack` running for episode `seed`, and its robot: for evaluation and viewers alone; see `LockstepRunner`.
 
     Raises:
         ConfigError, ModuleFault: see `build_robot`; so for every other module.

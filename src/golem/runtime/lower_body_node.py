@@ -26,19 +26,10 @@ JOINTS = LEGS.stop - LEGS.start
 
 
 class CheckedLowerBody:
-    """A leg controller and who watches it.
-
-    Attributes:
-        controller, contract: the two.
-        rate: ticks per second [Hz].
-    """
+    """A leg controller that ticks at `rate` [Hz], and who watches it."""
 
     def __init__(self, controller: LowerBody, contract: ContractCheck, on_ground: bool = False) -> None:
-        """Take `controller`, watched by `contract`, of a robot that stands `on_ground` or hangs.
-
-        Raises:
-            ModuleFault: its rate, latency, envelope or gait is none.
-        """
+        """Take `controller`, of a robot `on_ground` or in a hoist. Raises ModuleFault: it declares what cannot be."""
         self.controller, self.contract, self._on_ground = controller, contract, on_ground
         contract.kind("envelope", controller.envelope, Envelope)
         contract.kind("gait", controller.gait, GaitConfig)
@@ -46,11 +37,7 @@ class CheckedLowerBody:
         contract.times.allowed = 1.0 / self.rate + self.check_latency()
 
     def check_latency(self) -> float:
-        """Return the latency at this moment [s]; a controller may measure its own.
-
-        Raises:
-            ModuleFault: it is none.
-        """
+        """Return the latency at this moment [s]; a controller may measure its own. Raises ModuleFault: it is none."""
         latency = self.contract.call(getattr, self.controller, "latency")
         if type(latency) is float and 0.0 <= latency < math.inf:
             return latency
@@ -168,20 +155,9 @@ class LowerBodyNode:
         if envelope is not self._reported:
             self._reported, self._speed = envelope, envelope.speed
         status = LegStatus(
-            t,
-            locomotion.commanded,
-            locomotion.applied,
-            locomotion.clamped,
-            locomotion.reason,
-            locomotion.motion.stepping,
-            locomotion.moving,
-            locomotion.rest,
-            locomotion.motion.phase,
-            self._legs.contract.use,
-            None if self._fault is None else str(self._fault),
-            self._speed,
-            None if self._fault is None else self._fault.trace,
-            locomotion.height,
-            envelope.height,
-        )
+            t, locomotion.commanded, locomotion.applied, locomotion.clamped, locomotion.reason,
+            locomotion.motion.stepping, locomotion.moving, locomotion.rest, locomotion.motion.phase,
+            self._legs.contract.use, None if self._fault is None else str(self._fault), self._speed,
+            None if self._fault is None else self._fault.trace, locomotion.height, envelope.height,
+        )  # fmt: skip
         self._bus.publish(topics.LEG_STATUS, status, t)

@@ -30,18 +30,15 @@ class BusNav2:
         self._twists = News(bus, topics.NAV2_TWIST)
 
     def send(self, pose: PlanarPose) -> None:
-        """Propose a goal; see `Nav2Link`."""
         self._number += 1
         self._twists.read()
         self._bus.publish(topics.NAV2_GOAL, Nav2Goal(self._number, pose), 0.0)  # no latency: the time has no meaning
 
     def reply(self) -> Nav2Reply | None:
-        """Return how the newest goal stands; see `Nav2Link`."""
         reply = self._bus.latest(topics.NAV2_REPLY)
         return None if reply is None or reply.number != self._number else reply
 
     def twist(self) -> Twist | None:
-        """Return a new twist; see `Nav2Link`."""
         said = self._twists.read()
         return None if said is None else said.twist
 
@@ -70,7 +67,6 @@ class NavigatorNode:
         """Run a navigator.
 
         Args:
-            bus: where goals, map and scan are.
             legs: the lower body, as the running skill reads it.
             pool: where a navigator with a latency runs; None is here, at the price of the latency that it declares.
         """

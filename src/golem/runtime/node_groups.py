@@ -72,21 +72,13 @@ class ModuleFactory:
 
 
 def hears_lidar(stack: Stack) -> bool:
-    """Return whether `stack` listens to the LiDAR: its odometry does, or its navigator needs scans.
-
-    Raises:
-        ConfigError, ModuleFault: a class cannot be loaded.
-    """
+    """Return whether the odometry or the navigator of `stack` needs the LiDAR. Raises as `registry.load` does."""
     sources = getattr(registry.load("odometry", stack.choice("odometry").use), "sources", ())
     return bool({"imu", "scan"} & set(sources)) or SCAN in registry.requires("navigator", stack.choice("navigator").use)
 
 
 class RobotNodes:
-    """The robot with its motors, IMU, hands, cameras and on-board computer.
-
-    Attributes:
-        act: the one of them that lets time pass.
-    """
+    """The robot with motors, IMU, hands, cameras and on-board computer; its node `act` lets time pass."""
 
     def __init__(
         self,
@@ -128,11 +120,7 @@ class RobotNodes:
 
 
 class SafetyNodes:
-    """The emergency stop and the gate.
-
-    Attributes:
-        gate: the one of them that runs the gate.
-    """
+    """The emergency stop and the gate; the node `gate` runs the latter."""
 
     def __init__(
         self,

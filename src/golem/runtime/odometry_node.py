@@ -221,8 +221,7 @@ class OdometryNode:
             return
         T = base.T_odom_base
         v, rate = T[:3, :3].T @ base.velocity, sensed_base_rate(state)
-        legs = LegOdometry(t, T, v, float(state.q[TORSO]), base.stale, rate)
-        self._contract.call(self._odometry.add_legs, legs)
+        self._contract.call(self._odometry.add_legs, LegOdometry(t, T, v, float(state.q[TORSO]), base.stale, rate))
 
 
 class LidarNode:

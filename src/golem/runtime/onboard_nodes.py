@@ -30,11 +30,7 @@ STANCE = "crouch"
 
 
 def stack_loco_api(stack: Stack) -> LocoApi:
-    """Return the loco service that the lower body of `stack` speaks to; the assumed one where it speaks to none.
-
-    Raises:
-        ConfigError: its options are wrong.
-    """
+    """Return the loco service that the legs of `stack` speak to, or the assumed. Raises ConfigError: wrong options."""
     client = stack.onboard_client
     config = None if client is None else registry.configure("lower_body", client.use, client.options)
     return getattr(config, "loco_api", LOCO_APIS[LOCO_API])
@@ -89,9 +85,6 @@ class LocoServiceNode:
 
     In the start state the robot is controlled by any lower body, under a base layer of its own. A controller that fails
     is not replaced: the robot damps, and the service refuses to go on.
-
-    Attributes:
-        service: what answers.
     """
 
     period = TICK

@@ -102,11 +102,7 @@ class LocalizerNode:
         contract: ContractCheck,
         pool: ThreadPoolExecutor | None = None,
     ) -> None:
-        """Run a localizer.
-
-        Args:
-            pool: where it runs; None is here, at the price of the latency that it declares.
-        """
+        """Run a localizer in `pool`; None is here, at the price of the latency that it declares."""
         self._bus, self._localizer, self._camera, self._contract = bus, localizer, camera, contract
         self._latency = contract.number("latency", localizer.latency, minimum=0.0) if pool is None else 0.0
         contract.times.allowed = math.inf if pool is not None else max(self._latency, TICK)

@@ -26,12 +26,7 @@ ASKED = frozenset({Reason.REQUESTED, Reason.ESTOP_PRESSED})
 
 @dataclass
 class GateTally:
-    """What gates have done.
-
-    Attributes:
-        active: robot time in which commands passed [s].
-        stops: stops by reason, without those that were asked for.
-    """
+    """What gates have done: `active` robot time [s], and `stops` by reason, without those that were asked for."""
 
     active: float = 0.0
     stops: Counter[str] = field(default_factory=Counter[str])

@@ -16,11 +16,7 @@ from golem.stack import Choice, Stack
 
 
 class SkillTable:
-    """The skills of one stack by name.
-
-    Attributes:
-        specs: what others may know of them.
-    """
+    """The skills of one stack by name; `specs` is what others may know of them."""
 
     def __init__(self, stack: Stack) -> None:
         """Load every skill of `stack`, and make each once: a wrong option is better said now than when it is called.
@@ -35,22 +31,13 @@ class SkillTable:
             self.make(name)
 
     def spec(self, name: str) -> SkillSpec:
-        """Return what others may know of the skill called `name`.
-
-        Raises:
-            ConfigError: there is none of that name.
-        """
+        """Return what others may know of the skill called `name`. Raises ConfigError: there is none of that name."""
         if name not in self.specs:
             raise unknown_name("skill", name, self.specs)
         return self.specs[name]
 
     def make(self, name: str) -> Skill[Context, Any]:
-        """Return a new instance of the skill called `name`.
-
-        Raises:
-            ConfigError: there is none of that name.
-            ModuleFault: its constructor raised.
-        """
+        """Return a new instance of the skill `name`. Raises ConfigError: there is none; ModuleFault: it raised."""
         use = self.spec(name).use
         skill = registry.create(registry.SKILL, use, self._choices[name].options)
         for contract in (Routine, Skill):

@@ -72,11 +72,7 @@ class StandingLegs:
     """A standing controller with an estimator of its own."""
 
     def __init__(self) -> None:
-        """Load the shipped legs.
-
-        Raises:
-            ConfigError: this installation lacks them.
-        """
+        """Load the shipped legs. Raises ConfigError: this installation lacks them."""
         self._locomotion = Locomotion(registry.create("lower_body", LEGS_USED, {}))
         self._estimator = RandomWalkKF()
         self._kp, self._tau = np.zeros(NUM_JOINTS), np.zeros(NUM_JOINTS)
@@ -87,13 +83,8 @@ class StandingLegs:
         self._locomotion.reset(state)
 
     def step(self, state: LowState, damping: Array) -> LowCommand:
-        """Return what the motors are told in `state`: legs that stand, and `damping` (27,) for all others.
-
-        Raises:
-            GolemError: the controller failed.
-        """
-        base = self._estimator.step(state, TICK)
-        legs = self._locomotion.step(state, base, None, TICK)
+        """Return the command in `state`: legs that stand, others with `damping` (27,). Raises GolemError: it failed."""
+        legs = self._locomotion.step(state, self._estimator.step(state, TICK), None, TICK)
         q, kp, kd, tau = state.q.copy(), self._kp.copy(), damping.copy(), self._tau.copy()
         q[LEGS], kp[LEGS], kd[LEGS] = legs.q, legs.kp, legs.kd
         if legs.tau is not None:

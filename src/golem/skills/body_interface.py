@@ -23,13 +23,11 @@ class Navigation:
     """The navigator drives the legs to a goal while this is open (a context manager); then the robot stands."""
 
     def __init__(self, context: Context, goal: PlanarPose, frame: Literal["odom", "map"] = "odom") -> None:
-        """Go to `goal`, in `frame`."""
         self._context, self._goal = context, goal
         self._frame: Literal["odom", "map"] = frame
         self._seen = 0
 
     def __enter__(self) -> Navigation:
-        """Set off."""
         self._seen = self._context.bus.count(topics.NAV_STEP)
         self._context.publish(topics.NAV_GOAL, NavGoal(self._goal, self._frame))
         return self
@@ -101,11 +99,7 @@ class HandInterface:
 
     @property
     def status(self) -> HandStatus:
-        """What the hand's controller reports now.
-
-        Raises:
-            StageFailed: it has not reported yet.
-        """
+        """What the hand's controller reports now. Raises StageFailed: it has not reported yet."""
         status = self._context.bus.latest(topics.hand_status(self._side))
         if status is None:
             raise StageFailed("grasp", "hand", f"The {self._side} hand does not report.")
@@ -141,11 +135,7 @@ class LegsInterface:
 
     @property
     def status(self) -> LegStatus:
-        """What the base layer of the legs reports now.
-
-        Raises:
-            StageFailed: it has not reported yet.
-        """
+        """What the base layer of the legs reports now. Raises StageFailed: it has not reported yet."""
         status = self._context.bus.latest(topics.LEG_STATUS)
         if status is None:
             raise StageFailed("walk", "lower_body", "The legs do not report.")
@@ -153,11 +143,7 @@ class LegsInterface:
 
     @property
     def pose(self) -> Array:
-        """(4, 4) pose of base_link in odom by the odometry, or by the base estimate in a stack without one.
-
-        Raises:
-            StageFailed: the odometry has fallen silent.
-        """
+        """(4, 4) pose of base_link in odom by odometry, or by the base estimate. Raises StageFailed: it is silent."""
         odometry = self._context.bus.latest(topics.ODOMETRY)
         if odometry is not None and self._context.t - odometry.t > ODOMETRY_TIMEOUT:
             age = self._context.t - odometry.t
@@ -172,12 +158,7 @@ class LegsInterface:
         return "" if silence is None else silence.why
 
     def check_walking(self) -> None:
-        """Check that these are legs that can walk.
-
-        Raises:
-            ConfigError: they cannot.
-            StageFailed: they do not report.
-        """
+        """Check that these are legs that can walk. Raises ConfigError: they cannot; StageFailed: they do not report."""
         legs = self.status
         if legs.speed == 0.0:
             raise ConfigError(
@@ -185,11 +166,7 @@ class LegsInterface:
             )
 
     def check_located(self) -> None:
-        """Check that an odometry that this stack has knows where the robot is.
-
-        Raises:
-            StageFailed: it does not.
-        """
+        """Check that an odometry that this stack has knows where the robot is. Raises StageFailed: it does not."""
         if self.silence:
             raise StageFailed("locate", "odometry", f"The odometry does not know where the robot is: {self.silence}")
 

@@ -35,12 +35,7 @@ FRAME_TIME = 1.0
 
 
 class TagLooks:
-    """Brings a hand with tags before a camera, again and again.
-
-    Attributes:
-        info: the camera as its images tell; None until one came.
-        robot: what plans the ways.
-    """
+    """Brings a hand with tags before a camera, again and again; `info` is that camera, None until an image came."""
 
     def __init__(self, context: Context, camera: str) -> None:
         """Look with `camera`, from how the arms are now."""

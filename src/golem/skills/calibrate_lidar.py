@@ -138,11 +138,7 @@ class CalibrateLidar:
         return views, info
 
     async def _look(self, context: Context) -> tuple[SurfaceView, CameraInfo]:
-        """Return what camera and LiDAR see now of what rests, and the camera.
-
-        Raises:
-            StageFailed: one of them sends nothing.
-        """
+        """Return what camera and LiDAR see of what rests, and the camera. Raises StageFailed: one of them is silent."""
         bus, begin = context.bus, context.t
         depth: list[NDArray[np.float32]] = []
         points: dict[float, NDArray[np.float32]] = {}

@@ -27,7 +27,6 @@ class DetectionStream:
         self._since = 0.0
 
     def __enter__(self) -> DetectionStream:
-        """Start the stream."""
         self._seen = self._context.bus.count(topics.detections(self._camera))
         self._since = self._context.t
         self._context.publish(topics.detection_request(self._camera), DetectionRequest(self._labels))

@@ -208,8 +208,7 @@ class Dock:
             if len(seen.places):
                 drops = context.legs.drops
                 best = best_stance(edge.pose, seen.places, seen.weights, tray, drops)
-                here = stance_here(seen.places, seen.weights, tray, drops)
-                view = _View(best.pose, edge, here, best)
+                view = _View(best.pose, edge, stance_here(seen.places, seen.weights, tray, drops), best)
         text = f"{100 * view.distance:.1f} cm and {math.degrees(view.left.yaw):.1f} deg from the stance"
         if view.here is not None and view.best is not None:
             text += f", {view.here.served} {goal.label}s within reach here, {view.best.served} there"
@@ -233,6 +232,5 @@ def _result(view: _View, goal: DockGoal, approaches: int, seconds: float) -> Ski
         report.quality, report.served = view.here.quality, view.here.served
         text += f"; {view.here.served} {goal.label}s are within reach"
     if not _good(view, goal) and not report.served:
-        reason = f"Not good enough. {text}."
-        return SkillResult(False, "approach", "lower_body", reason, value=report)
+        return SkillResult(False, "approach", "lower_body", f"Not good enough. {text}.", value=report)
     return SkillResult(True, "done", None, f"{text}.", {"dock": seconds}, report)

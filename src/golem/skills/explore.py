@@ -101,11 +101,7 @@ class Explore:
         return SkillResult(True, "done", None, text, {"explore": context.t - start})
 
     def _file(self, name: str) -> Path:
-        """Return the path of a map without its ending, before the robot sets out for it.
-
-        Raises:
-            ConfigError: something else has the name of one of its files.
-        """
+        """Return the path of a map without its ending. Raises ConfigError: something else has one of its names."""
         for ending in (".pgm", CLOUD):
             kept_file(self.config.folder, f"{name}{ending}", _of_a_map)
         return kept_file(self.config.folder, f"{name}.yaml", load_map).with_suffix("")
@@ -142,9 +138,5 @@ class Explore:
 
 
 def _of_a_map(file: Path) -> None:
-    """Check that an image, or the voxels, belong to a map.
-
-    Raises:
-        ConfigError: they do not.
-    """
+    """Check that an image, or the voxels, belong to a map. Raises ConfigError: they do not."""
     load_map(file.with_suffix(".yaml"))

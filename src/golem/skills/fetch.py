@@ -23,7 +23,7 @@ from golem.skills.navigate import NavigateGoal
 from golem.skills.pack_view import see_edge
 from golem.skills.place import HANDS, PlaceGoal
 from golem.skills.pose_goal import FIRST_REPORT
-from golem.skills.poses import lifted
+from golem.skills.poses import head_off, lifted
 from golem.skills.recall import RecalledPlace, RecalledPlaces, ask
 from golem.skills.remember import RememberGoal
 from golem.skills.take_config import TakeGoal, TakeReport
@@ -78,12 +78,10 @@ def stance(edge: NearEdge, here: PlanarPose, place: Array) -> PlanarPose:
         here: where the robot is in odom.
         place: (2,) or (3,) what a hand is to get to, in odom [m].
     """
-    local = here.to(PlanarPose(float(place[0]), float(place[1]), 0.0))
-    across = edge.pose.to(local)
+    across = edge.pose.to(here.to(PlanarPose(float(place[0]), float(place[1]), 0.0)))
     standoff = float(np.clip(AHEAD - across.x, *STANDOFF))
     # On the side on which the robot is already: the hand of the other side is as good.
-    now = edge.pose.to(PlanarPose(0.0, 0.0, 0.0))
-    aside = float(np.clip(now.y - across.y, -BESIDE, BESIDE))
+    aside = float(np.clip(edge.pose.to(PlanarPose(0.0, 0.0, 0.0)).y - across.y, -BESIDE, BESIDE))
     return edge.pose @ PlanarPose(-standoff, across.y + aside, 0.0)
 
 
@@ -188,8 +186,7 @@ class Fetch:
             await context.until(lambda: context.legs.reporting, FIRST_REPORT)
             walks, home = context.legs.status.speed > 0.0, PlanarPose.of(context.legs.pose)
             to = self._destination(context, goal, home)
-            taken = await self._take_one(context, goal, report, walks)
-            report.taken = taken
+            report.taken = await self._take_one(context, goal, report, walks)
             reason = await self._bring(context, goal, report, walks, home, to)
         except StageFailed as failure:
             context.say(failure.stage, str(failure), failed=True)
@@ -218,8 +215,7 @@ class Fetch:
         if not places and not walks:
             result = await self._take(context, goal, None)
         for place in places:
-            spot = self._in_odom(context, place)
-            result = await self._try(context, goal, report, spot, walks)
+            result = await self._try(context, goal, report, self._in_odom(context, place), walks)
             if result.success or not _elsewhere(result):
                 break
             context.say("recall", f"{result.reason} The next best place.")
@@ -336,7 +332,6 @@ class Fetch:
         """Carry it to where it is wanted; returns a sentence."""
         taken = report.taken
         side: Side = "left" if taken.side == "left" else "right"
-        facing = PlanarPose.of(context.legs.pose).yaw
         with context.minding(KeptGrip(context, side, taken.force, goal.text)):
             if walks:
                 await self._raise(context, side)
@@ -351,13 +346,11 @@ class Fetch:
         if to is None:
             return f"The {goal.text} is in the {side} hand, where the robot began."
         spot = self._in_odom(context, to)
-        aside, turned = (taken.aside_x, taken.aside_y), PlanarPose.of(context.legs.pose).yaw - facing
-        # What the head camera is off by turns with the robot.
-        off = PlanarPose(0.0, 0.0, turned) @ PlanarPose(taken.off_x, taken.off_y, 0.0)
+        aside, off = (taken.aside_x, taken.aside_y), (taken.off_x, taken.off_y)
         if goal.frame == "seen":
-            spot += (1.0 - HANDS) * np.array([off.x, off.y])
+            spot += (1.0 - HANDS) * head_off(context.T_odom_base, spot, off)
         x, y, below, above = float(spot[0]), float(spot[1]), taken.below, taken.above
-        there = PlaceGoal(x, y, "odom", side, below, above, aside, (off.x, off.y), taken.radius, goal.text)
+        there = PlaceGoal(x, y, "odom", side, below, above, aside, off, taken.radius, goal.text)
         (await context.run("place", there)).check("skill")
         report.x, report.y = float(spot[0]), float(spot[1])
         return f"The {goal.text} was set down at ({spot[0]:.2f}, {spot[1]:.2f}) in odom."

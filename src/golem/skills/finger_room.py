@@ -36,6 +36,10 @@ ABOVE = 0.015
 """How far the tips stay above what is in their way [m]."""
 TURNS = (0.2, -0.2, 0.4, -0.4, 0.6, -0.6)
 """Turns about the vertical that are tried, in order, where the fingers have no room [rad]."""
+ACROSS = (0.5 * np.pi, -0.5 * np.pi)
+"""Turns of a hand that comes anew, for which a servo is too near [rad]: beside a wall the fingers fit along it."""
+PATIENCE = 0.5
+"""Time for which something is in the way before the hand comes anew [s]."""
 TURN_RATE = 0.6
 """How fast the hand turns [rad/s]."""
 SLOW, GAIN = 0.03, 3.0
@@ -50,6 +54,7 @@ class FingerRoom:
     Attributes:
         blocked: whether something is in the way of the fingers at the last goal that was asked about, however the hand
             turns.
+        across: whether that has been so for a while, and the fingers would have room across.
     """
 
     def __init__(self, context: Context, side: Side, gap: float) -> None:
@@ -58,8 +63,8 @@ class FingerRoom:
         self._middle = context.arms[side].commanded[:2, 3].copy()
         self._heights = np.full((2 * HALF, 2 * HALF), np.nan)
         self._tips = _fingertips(gap)
-        self._turn = self._wanted = 0.0
-        self.blocked = False
+        self._turn = self._wanted = self._blocked_for = 0.0
+        self.blocked = self.across = False
 
     def look(self) -> None:
         """Take over what the newest image of the palm camera shows; newer is nearer, and replaces what was there."""
@@ -68,8 +73,7 @@ class FingerRoom:
             return
         points = _ground(frame)
         cells = self._cells(points)
-        inside = (cells >= 0) & (cells < 2 * HALF)
-        kept = inside.all(axis=1)
+        kept = ((cells >= 0) & (cells < 2 * HALF)).all(axis=1)
         flat = cells[kept] @ (2 * HALF, 1)
         counts = np.bincount(flat, minlength=self._heights.size)
         sums = np.bincount(flat, points[kept, 2], minlength=self._heights.size)
@@ -94,6 +98,9 @@ class FingerRoom:
             self._wanted = self._wanted if wanted is None else wanted
         else:
             self.blocked = False
+        self._blocked_for = self._blocked_for + self._context.period if self.blocked else 0.0
+        if self._blocked_for > PATIENCE:
+            self.across = min(self._misses(T_goal, turn) for turn in ACROSS) < 0.5 * ROUGH
         step = TURN_RATE * self._context.period
         self._turn += min(max(self._wanted - self._turn, -step), step)
         T = turned(T_goal, self._turn)

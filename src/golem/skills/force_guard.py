@@ -31,11 +31,7 @@ class KeptGrip:
         self._since: float | None = None
 
     def __call__(self) -> None:
-        """Look at the hand.
-
-        Raises:
-            StageFailed: it has closed again, and holds nothing.
-        """
+        """Look at the hand. Raises StageFailed: it has closed again, and holds nothing."""
         hand, now = self._context.hands[self._side], self._context.t
         if hand.status.holding:
             self._since = None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
 from enum import StrEnum
 from pathlib import Path
 
@@ -56,7 +56,7 @@ class PackFastener:
         fate: what became of it.
         reason: one sentence.
         side: hand that tried it.
-        tray: class of the container that it is in.
+        tray: name of the container that it is in, or its class where none is listed.
         stance: of base_link in the pack frame.
         t, when: robot time [s], and the date, in UTC.
         picture: path of a picture, from the folder of the job.
@@ -96,10 +96,10 @@ class JobFile(SqliteFile):
         containers: what else was listed.
     """
 
-    fault, what, version, synchronous = JobFault, "job", 1, "FULL"
+    fault, what, version, synchronous = JobFault, "job", 2, "FULL"
     tables = (
         "listed (number INTEGER PRIMARY KEY, name TEXT NOT NULL, kind TEXT NOT NULL, x REAL NOT NULL, y REAL NOT NULL,"
-        " z REAL NOT NULL, loose INTEGER)",
+        " z REAL NOT NULL, loose INTEGER, takes TEXT NOT NULL)",
         "events (id INTEGER PRIMARY KEY, number INTEGER NOT NULL REFERENCES listed, fate TEXT NOT NULL,"
         " reason TEXT NOT NULL, side TEXT NOT NULL, tray TEXT NOT NULL, x REAL, y REAL, yaw REAL, t REAL NOT NULL,"
         " happened TEXT NOT NULL DEFAULT CURRENT_TIMESTAMP, picture TEXT NOT NULL)",
@@ -119,17 +119,23 @@ class JobFile(SqliteFile):
         try:
             with self._faults():
                 self._read(listed)
+        except (KeyError, TypeError, ValueError) as error:
+            self.close()
+            raise JobFault(f"The job {path} is damaged, {error!r}; name another file.") from error
         except BaseException:
             self.close()
             raise
 
     def _read(self, listed: Sequence[Listed]) -> None:
-        rows = self._base.execute("SELECT name, kind, x, y, z, loose FROM listed ORDER BY number").fetchall()
+        rows = self._base.execute("SELECT name, kind, x, y, z, loose, takes FROM listed ORDER BY number").fetchall()
         if not rows:
             with self._writing() as base:
-                values = [(k, one.name, one.kind, one.x, one.y, one.z, one.loose) for k, one in enumerate(listed)]
-                base.executemany("INSERT INTO listed VALUES (?, ?, ?, ?, ?, ?, ?)", values)
-        kept = [Listed(a, b, x, y, z, None if s is None else bool(s)) for a, b, x, y, z, s in rows] or list(listed)
+                values = [(k, *astuple(one)) for k, one in enumerate(listed)]
+                base.executemany("INSERT INTO listed VALUES (?, ?, ?, ?, ?, ?, ?, ?)", values)
+        kept = [
+            Listed(a, b, float(x), float(y), float(z), None if s is None else bool(s), t)
+            for a, b, x, y, z, s, t in rows
+        ] or list(listed)
         if listed and kept != list(listed):
             raise JobFault(f"The job {self.path} is of another list; name another job, or no list to go on with it.")
         self.fasteners = [PackFastener(k, one) for k, one in enumerate(kept) if one.kind in KINDS]
@@ -139,7 +145,7 @@ class JobFile(SqliteFile):
         by_number = {one.number: one for one in self.fasteners}
         told = "SELECT number, fate, reason, side, tray, x, y, yaw, t, happened, picture FROM events ORDER BY id"
         for number, fate, reason, side, tray, x, y, yaw, t, when, picture in self._base.execute(told):
-            stance = None if x is None else PlanarPose(x, y, yaw)
+            stance = None if x is None else PlanarPose(float(x), float(y), float(yaw))
             _take(by_number[number], Fate(fate), reason, side, tray, stance, t, when, picture)
 
     def tell(

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Collection
 
 import cv2
 import numpy as np
@@ -12,83 +10,21 @@ import numpy as np
 from golem.capabilities.navigation.goto import GoTo
 from golem.interfaces import topics
 from golem.interfaces.memory_payloads import ShownPicture
-from golem.middleware.bus import News
 from golem.skills.base import FAULT, REFUSED, SkillResult, StageFailed
 from golem.skills.context import Context
 from golem.skills.disassemble_goal import DisassembleGoal, DisassembleReport
-from golem.skills.dock import APPROACH, DockGoal, DockReport, approach
-from golem.skills.fastener_list import KINDS
+from golem.skills.dock import APPROACH, SETTLE, DockReport, approach
+from golem.skills.fastener_list import KINDS, Listed
+from golem.skills.gantry import KEEP_OFF, Gantry
 from golem.skills.job_file import TO_DO, Fate, JobFile, PackFastener
 from golem.skills.navigate import NavigateGoal
 from golem.skills.pack_picture import pack_picture
 from golem.skills.pack_plan import PackSides, PackStop, make_plan
-from golem.skills.pack_view import NOTHING, see_edge, see_fasteners
+from golem.skills.pack_view import NOTHING, SeenRim, fit_frames, matched, see_edge, see_fasteners
 from golem.skills.pick_config import PickGoal, PickOutcome, PickReport, Sight, Tried
 from golem.skills.pick_targets import WANTED
+from golem.skills.stance_choice import OVER_TRAY, takes, within_reach
 from golem.types import Array, PlanarPose, Side
-
-SENTENCE = re.compile(r"\s*Remove: (\S{1,60}) with confidence = (\S{1,20})\s*")
-"""On the topic `/triggered_behavior`."""
-KEEP_OFF = 0.9
-"""Distance from where the gantry works at which nobody stands or reaches [m] [own]."""
-SILENT = 90.0
-"""Time without a word after which no more is waited for [s]; a removal takes RAPID 20 s."""
-
-
-class Gantry:
-    """Listens at every tick.
-
-    Attributes:
-        at: name of the fastener it is at, where it stays until it says another one; empty before its first word.
-        loosened: names of those it is done with.
-        t: time of its last word [s], first that of the beginning.
-    """
-
-    def __init__(self, context: Context, names: Collection[str]) -> None:
-        """Hear what comes from now on, in the stack of `context`, of the fasteners called `names`."""
-        self._context, self._names, self._news = context, names, News(context.bus, topics.REMOVALS)
-        self.at, self.loosened, self.t = "", set[str](), context.t
-
-    def __call__(self) -> None:
-        """Listen."""
-        said = SENTENCE.fullmatch((self._news.read() or "")[:100])
-        if said is not None and said[1] in self._names:
-            self.loosened |= {self.at} - {said[1], ""}
-            self.at, self.t = said[1], self._context.t
-
-    @property
-    def silent(self) -> bool:
-        """Whether nothing more is to be expected of it."""
-        return self._context.t - self.t > SILENT
-
-
-def fit_frames(a: Array, b: Array) -> tuple[PlanarPose, float]:
-    """Return where the frame of `a` is in that of `b`, and the RMS distance that is left [m].
-
-    Least squares over turn and shift, as Kabsch (Acta Cryst. A32, 1976), for frames whose z axes are parallel.
-
-    Args:
-        a: (n, 2) places, n >= 1; of one alone follows no turn [m].
-        b: (n, 2) the same in the other frame [m].
-    """
-    mid_a, mid_b = a.mean(axis=0), b.mean(axis=0)
-    p, q = a - mid_a, b - mid_b
-    turn = math.atan2(float(np.sum(p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0])), float(np.sum(p * q)))
-    R = PlanarPose(0.0, 0.0, turn).matrix()[:2, :2]
-    left = a @ R.T + (mid_b - R @ mid_a) - b
-    x, y = (mid_b - R @ mid_a).tolist()
-    return PlanarPose(x, y, turn), float(np.sqrt(np.mean(np.sum(left**2, axis=1))))
-
-
-def matched(known: Array, seen: Array, within: float) -> tuple[Array, Array]:
-    """Return the pairs (k, 2), (k, 2) of `known` (n, 2) and `seen` (m, 2) places that are nearest to each other."""
-    if not len(known) or not len(seen):
-        return np.zeros((0, 2)), np.zeros((0, 2))
-    away = np.linalg.norm(known[:, None] - seen[None], axis=2)
-    mine, other = away.argmin(axis=0), away.argmin(axis=1)
-    good = [k for k in range(len(seen)) if other[mine[k]] == k and away[mine[k], k] < within]
-    return known[mine[good]], seen[good]
-
 
 ORDER = ("near", "left", "far", "right")
 """Sides of a pack, as in `PackSides`."""
@@ -102,10 +38,16 @@ SHIFTED = 0.3
 """Farthest that the container may be seen from where it is listed, for the pack to be found by it [m]."""
 LONG = 0.25
 """Extent of the fasteners by which the turn of the pack is measured [m]."""
+FARTHEST_OFF = 0.08
+"""How far a palm camera may see things elsewhere than the head camera [m]: each is off by centimetres."""
 BESIDE = 1.0
 """A stance this near is gone to straight along the edge [m]."""
 BACK = 0.35
 """How far the robot steps back before it walks elsewhere [m]."""
+THERE = (0.04, 0.06)
+"""How near to its stance the robot stands well [m, rad]: it plans with more room than that."""
+APPROACHES = 3
+"""How often it steps there, seeing better where the pack is each time."""
 STAGE = 0.75
 """Distance before a stance up to which the navigator brings the robot [m]: nearer its arms are above the pack."""
 CONTENT = 0.1
@@ -136,8 +78,8 @@ class PackJob:
         self.report, self._gantry = DisassembleReport(), Gantry(context, {one.listed.name for one in book.fasteners})
         self._sides = PackSides(np.array([one.place for one in book.fasteners]))
         self._T_odom_pack = PlanarPose(0.0, 0.0, 0.0)
-        self._rim = 0.0  # height of the pack's rim above base_link [m]
-        self._off: Array = np.zeros(2)  # where the palm cameras see fasteners, from where the head camera does [m]
+        self._rim = SeenRim()  # above base_link, had the legs no height
+        self._off = dict[str, Array]()  # (2,) from where the head camera sees things to where that of a hand does [m]
         self._full, self._strikes = set[str](), 0
         self._stops: list[PackStop] = []
 
@@ -173,10 +115,42 @@ class PackJob:
         claimed = said.get(self._goal.loosened, True)
         return one.fate in TO_DO and claimed and bool(self._container(one.label))
 
+    def _trays(self, label: str) -> list[Listed]:
+        """Return the containers of the list that take fasteners of a label and are not full, of one class."""
+        mine = [c for c in self._listed(label) if c.kind in self._classes(label) and c.name not in self._full]
+        return [c for c in mine if c.kind == mine[0].kind]
+
+    def _listed(self, label: str) -> list[Listed]:
+        return [c for c in self._book.containers if c.takes in ("", label)]
+
+    def _classes(self, label: str) -> tuple[str, ...]:
+        return self._goal.nuts if label == "nut" else self._goal.screws
+
     def _container(self, label: str) -> str:
-        """Return what fasteners of a label are put into; empty where all are full."""
-        names = self._goal.nuts if label == "nut" else self._goal.screws
-        return next((name for name in names if name not in self._full), "")
+        """Return the class of what fasteners of a label are put into; empty where all are full."""
+        if self._listed(label):
+            return next((tray.kind for tray in self._trays(label)), "")
+        return next((name for name in self._classes(label) if name not in self._full), "")
+
+    def _tray(self, label: str, side: Side) -> Listed | None:
+        """Return the listed container that a hand gets to best from here; None where none is listed."""
+
+        def room(tray: Listed) -> float:
+            over = self._from_here(tray) + (0.0, 0.0, OVER_TRAY)
+            return float(within_reach(np.zeros((1, 3)), over, side).max()) - math.hypot(*over[0, :2])
+
+        return max(self._trays(label), key=room, default=None)
+
+    def _from_here(self, one: Listed) -> Array:
+        """Return (n, 3) where something of the list is in base_link, at each height that the legs have [m]."""
+        here = self._T_pack_base.to(PlanarPose(one.x, one.y, 0.0))
+        return np.array([(here.x, here.y, one.z + rim) for rim in self._rims])
+
+    @property
+    def _rims(self) -> list[float]:
+        """Heights of the rim above base_link at each height that the legs have [m]."""
+        now = self._rim.height - self._context.legs.height
+        return [now + drop for drop in self._context.legs.drops]
 
     def _gantry_at(self) -> Array | None:
         """Return (2,) where the gantry works, in the pack frame [m]; None where nobody said."""
@@ -190,11 +164,11 @@ class PackJob:
         """Return the stops from here, and say them."""
         containers: dict[str, Array] = {}
         for label in set(KINDS.values()):
-            places = [(c.x, c.y, c.z) for c in self._book.containers if c.kind == self._container(label)]
+            places = [(c.x, c.y, c.z) for c in self._trays(label)]
             containers |= {label: np.array(places)} if places else {}
         at = self._gantry_at()
         away = None if at is None else (at, KEEP_OFF)
-        args = self._sides, todo, containers, self._T_pack_base, self._rim, away
+        args = self._sides, todo, containers, self._T_pack_base, self._rims, away
         plan = await self._context.think(lambda: make_plan(*args), PLANNING)
         served, walk = sum(len(stop.picks) for stop in plan), sum(stop.way for stop in plan)
         text = f"{len(plan)} stops, {walk:.1f} m of way, for {served} of {len(todo)} fasteners."
@@ -215,9 +189,10 @@ class PackJob:
     def _T_pack_base(self) -> PlanarPose:
         return self._T_odom_pack.to(PlanarPose.of(self._context.legs.pose))
 
-    def _in_odom(self, one: PackFastener) -> Array:
-        """Return (2,) where a fastener is, as the head camera sees it, in odom [m]."""
-        there = self._T_odom_pack @ PlanarPose(one.listed.x, one.listed.y, 0.0)
+    def _in_odom(self, one: PackFastener | Listed) -> Array:
+        """Return (2,) where something of the list is, as the head camera sees it, in odom [m]."""
+        at = one.listed if isinstance(one, PackFastener) else one
+        there = self._T_odom_pack @ PlanarPose(at.x, at.y, 0.0)
         return np.array([there.x, there.y])
 
     async def _find(self) -> None:
@@ -227,13 +202,13 @@ class PackJob:
         T_edge_pack = T_pack_edge.to(PlanarPose(0.0, 0.0, 0.0))
         self._T_odom_pack = PlanarPose.of(self._context.legs.pose) @ edge.pose @ T_edge_pack
         base = self._context.bus.latest(topics.BASE)
-        self._rim = edge.height - (0.0 if base is None else base.height)
+        self._rim = SeenRim(edge.height - (0.0 if base is None else base.height) + self._context.legs.height)
 
     async def _work(self, stop: PackStop) -> None:
         """Go to a stop, and take what is planned there, until the gantry comes or there is trouble with the tray."""
         by_number = {one.number: one for one in self._book.fasteners}
         ones: list[tuple[PackFastener, Side]] = [(by_number[k], side) for k, side in stop.picks]
-        if not await self._stand(stop, [one for one, _ in ones]):
+        if not await self._stand(stop, ones):
             for one, side in ones:
                 await self._tell(one, Fate.OPEN, one.reason, side, stance=stop.pose)
             return self._strike("The robot does not get to its stances before the pack.", "skill")
@@ -246,6 +221,10 @@ class PackJob:
                 why = one.reason or "The job ended while it was being taken: it may be in the tray."
                 await self._tell(one, Fate.LOST, f"{why} Its place is empty now.")
                 continue
+            if not self._reaches(one, side):
+                text = f"Where the robot stopped the {side} hand does not reach it."
+                await self._tell(one, Fate.OPEN, text, side, stance=stop.pose)
+                continue
             outcome = await self._take(one, side)
             if outcome is PickOutcome.TRAY_MISSING:
                 return self._strike(f"No {self._container(one.label)} is seen.", "localizer")
@@ -256,12 +235,16 @@ class PackJob:
         self._strikes = 0
         return None
 
+    def _reaches(self, one: PackFastener, side: Side) -> bool:
+        """Return whether a hand gets to a fastener, at one of the heights that the legs have."""
+        return bool(takes(np.zeros((1, 3)), self._from_here(one.listed), side).any())
+
     def _strike(self, text: str, slot: str) -> None:
         self._strikes += 1
         if self._strikes >= STRIKES:
             raise StageFailed("detect", slot, text)
 
-    async def _stand(self, stop: PackStop, ones: list[PackFastener]) -> bool:
+    async def _stand(self, stop: PackStop, ones: list[tuple[PackFastener, Side]]) -> bool:
         """Bring the robot to a stop, and find the pack anew from there; returns whether something is within reach."""
         context, target = self._context, self._T_odom_pack @ stop.pose
         here = PlanarPose.of(context.legs.pose)
@@ -276,15 +259,21 @@ class PackJob:
             if not walked.success:
                 context.say(walked.stage, walked.reason, failed=True)
                 return False
-        label = ones[0].label
-        wanted = tuple(v for one in ones if one.label == label for v in self._in_odom(one).tolist())
-        goal = DockGoal(lateral=None, label=label, container=self._container(label), wanted=wanted)
-        docked = await context.run("dock", goal)
-        found = docked.value if isinstance(docked.value, DockReport) else DockReport()
+        navigator, found = GoTo(APPROACH), DockReport()
+        while True:
+            await context.sleep(SETTLE)
+            for label in sorted({one.label for one, _ in ones}):
+                await self._find_again(label, self._container(label))
+            left = self._T_pack_base.to(stop.pose)
+            found.left, away = (left.x, left.y, left.yaw), math.hypot(left.x, left.y)
+            if (away < THERE[0] and abs(left.yaw) < THERE[1]) or found.approaches == APPROACHES:
+                break
+            await approach(context, navigator, self._T_odom_pack @ stop.pose)
+            found.approaches += 1
+        found.served = sum(self._reaches(one, side) for one, side in ones)
         self.report.docks.append(found)
-        for each in sorted({one.label for one in ones}):
-            await self._find_again(each, self._container(each))
-        return docked.success or bool(found.served)
+        context.say("look", f"{100 * away:.1f} cm from the stance, {found.served} of {len(ones)} within reach.")
+        return bool(found.served)
 
     async def _find_again(self, label: str, container: str) -> None:
         """Measure where the pack is by what the head camera shows of it: first by the container, then by the rest."""
@@ -298,29 +287,37 @@ class PackJob:
             away = T[:2, :2] @ seen.tray[:2] + T[:2, 3] - boxes
             nearest = away[int(np.linalg.norm(away, axis=1).argmin())]
             shift = nearest if np.linalg.norm(nearest) < SHIFTED else shift
-        a, b = matched(known[:, :2] + shift, places, WANTED)
+        heights = seen.places[:, 2] + self._context.legs.height
+        a, b = matched(known + (*shift, 0.0), np.column_stack([places, heights]), WANTED)
         if not len(a):
             return
+        self._rim, a, b = SeenRim.of(a[:, :2], b[:, 2] - a[:, 2]), a[:, :2], b[:, :2]
         moved, _ = fit_frames(a - shift, b)
         if len(a) < 4 or float(np.ptp(a, axis=0).max()) < LONG:
             x, y = (b - a + shift).mean(axis=0).tolist()
             moved = PlanarPose(x, y, 0.0)
         self._T_odom_pack = self._T_odom_pack @ moved
-        self._rim = float(np.median(seen.places[:, 2]) - np.median(known[:, 2]))
 
     async def _still_there(self, one: PackFastener) -> bool:
-        """Look whether a fastener that may be anywhere is in its place."""
-        seen = await see_fasteners(self._context, one.label, self._container(one.label), NOTHING, False)
-        T = self._context.T_odom_base
-        places = seen.places @ T[:3, :3].T + T[:3, 3]
-        return bool((np.linalg.norm(places[:, :2] - self._in_odom(one), axis=1) < WANTED).any())
+        """Look whether a fastener that may be anywhere is in its place: what is seen nearer to another is that."""
+        there, container, T = self._in_odom(one)[None], self._container(one.label), self._context.T_odom_base
+        seen = await see_fasteners(self._context, one.label, container, NOTHING, False, there)
+        left = [other for other in self._book.fasteners if other.fate is not Fate.IN_TRAY]
+        known = np.array([self._in_odom(other) for other in left])
+        away = np.linalg.norm((seen.places @ T[:3, :3].T + T[:3, 3])[:, None, :2] - known, axis=2)
+        return any(left[int(k)] is one for k in away.argmin(axis=1))
 
     async def _take(self, one: PackFastener, side: Side) -> PickOutcome:
         """Try one fastener, and keep what came of it."""
-        stance, container = self._T_pack_base, self._container(one.label)
+        stance, container, listed = self._T_pack_base, self._container(one.label), self._tray(one.label, side)
         await self._tell(one, Fate.TRYING, side=side, stance=stance)
-        x, y = self._in_odom(one).tolist()
-        result = await self._context.run("pick", PickGoal(one.label, container, side, wanted=(x, y)))
+        (x, y), name = self._in_odom(one).tolist(), container if listed is None else listed.name
+        at = () if listed is None else tuple(self._in_odom(listed).tolist())
+        off = tuple(self._off[side].tolist()) if side in self._off else ()
+        rim = self._rim.at(one.place) - self._context.legs.height
+        level = float(self._context.T_odom_base[2, 3]) + rim + one.listed.z
+        goal = PickGoal(one.label, container, side, wanted=(x, y), level=(level,), container_at=at, off=off)
+        result = await self._context.run("pick", goal)
         found = result.value if isinstance(result.value, PickReport) else PickReport()
         self.report.picks.append(found)
         outcome, reason, fate = PickOutcome(found.outcome), result.reason, Fate.OPEN
@@ -331,9 +328,9 @@ class PackJob:
         if result.success and found.in_tray != Sight.NO:
             fate, self.report.picked = Fate.IN_TRAY, self.report.picked + 1
         elif outcome is PickOutcome.TRAY_FULL:
-            self._full.add(container)
+            self._full.add(name)
         elif outcome in (PickOutcome.PICKED, PickOutcome.SLIPPED) and found.bore_empty != Sight.NO:
-            reason = f"It was let go and is not seen in the {container}." if result.success else reason
+            reason = f"It was let go and is not seen in the {name}." if result.success else reason
             await self._tell(taken, Fate.UNSETTLED, reason, side)
             if not await self._still_there(taken):
                 fate, reason = Fate.LOST, f"{reason} Its place is empty now."
@@ -344,7 +341,7 @@ class PackJob:
         ):
             fate = FATES.get(outcome, Fate.FAILED)
             fate = Fate.MISSING if fate is Fate.NOT_FOUND and not found.tried else fate
-        tray = container if fate is Fate.IN_TRAY else ""
+        tray = name if fate is Fate.IN_TRAY else ""
         await self._tell(taken, fate, reason, side, tray, stance, await self._picture(taken))
         if result.stage in (FAULT, REFUSED):
             raise StageFailed(result.stage, result.slot or "skill", result.reason)
@@ -352,11 +349,14 @@ class PackJob:
 
     def _which(self, one: PackFastener, tried: Tried) -> PackFastener:
         """Return which fastener a hand was at that was sent to `one`, and learn what the palm cameras are off by."""
-        place = np.array([tried.x, tried.y])
-        away = np.linalg.norm([place - self._off - self._in_odom(each) for each in self._book.fasteners], axis=1)
-        if np.linalg.norm(place - self._in_odom(one)) < WANTED:
-            self._off = 0.5 * (self._off + place - self._in_odom(one))
-        return self._book.fasteners[int(away.argmin())] if away.min() < WANTED / 2 else one
+        place, there = np.array([tried.x, tried.y]), [f for f in self._book.fasteners if f.fate is not Fate.IN_TRAY]
+        known = self._off.get(tried.side, np.zeros(2))
+        left = [np.linalg.norm(place - known - self._in_odom(each)) for each in there]
+        nearest = int(np.argmin(left))
+        taken = there[nearest] if left[nearest] < WANTED / 2 else one
+        if np.linalg.norm(off := place - self._in_odom(taken)) < FARTHEST_OFF:
+            self._off[tried.side] = off
+        return taken
 
     async def _tell(
         self, one: PackFastener, fate: Fate, reason: str = "", side: str = "", tray: str = "",

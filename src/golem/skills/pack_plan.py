@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from golem.skills.job_file import PackFastener
-from golem.skills.stance_choice import LOOK_TURN, OVER_TRAY, seen_from, takes, within_reach
+from golem.skills.stance_choice import LOOK_TURN, OVER_TRAY, VIEWS, seen_from, takes, within_reach
 from golem.types import SIDES, Array, PlanarPose, Side
 
 INSET = 0.022
@@ -105,7 +105,7 @@ def make_plan(
     wanted: Sequence[PackFastener],
     containers: Mapping[str, Array],
     here: PlanarPose,
-    rim: float,
+    rims: Sequence[float],
     keep_off: tuple[Array, float] | None = None,
 ) -> list[PackStop]:
     """Return the stops, in order, from which everything of `wanted` is served that can be.
@@ -115,7 +115,7 @@ def make_plan(
         containers: label of fasteners -> (k, 3) places in the pack frame of what they may be put into; a label without
             is put into what will be seen.
         here: where the robot is, in the pack frame.
-        rim: height of the rim above base_link [m].
+        rims: height of the rim above base_link at each height that the robot may stand at [m].
         keep_off: (2,) place in the pack frame and distance from it in which nobody may stand or reach [m].
     """
     poses = sides.stances()
@@ -125,7 +125,8 @@ def make_plan(
         wanted = [one for one in wanted if np.hypot(*(one.place[:2] - place)) > distance]
     if not poses or not wanted:
         return []
-    quality = _quality(np.array([(p.x, p.y, p.yaw) for p in poses]), wanted, containers, rim)
+    places = np.array([(p.x, p.y, p.yaw) for p in poses])
+    quality = np.max([_quality(places, wanted, containers, rim) for rim in rims], axis=0)
     for f, one in enumerate(wanted):
         for stance, hand in one.barred:
             gone = [stance.to(p) for p in poses]
@@ -157,7 +158,8 @@ def _quality(stances: Array, wanted: Sequence[PackFastener], containers: Mapping
     for label in {one.label for one in wanted}:
         mine = [f for f, one in enumerate(wanted) if one.label == label]
         places, trays = np.array([wanted[f].place for f in mine]) + lift, containers.get(label)
-        seen = np.any([seen_from(stances, places, turn) for turn in (0.0, LOOK_TURN, -LOOK_TURN)], axis=0)
+        turned = seen_from(stances, places, LOOK_TURN) | seen_from(stances, places, -LOOK_TURN)
+        seen = np.where(seen_from(stances, places, 0.0), VIEWS[0], VIEWS[1] * turned)
         for k, side in enumerate(SIDES):
             near = takes(stances, places, side) * seen
             if trays is not None:

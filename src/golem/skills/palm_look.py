@@ -18,6 +18,7 @@ from golem.capabilities.arms.reach_map import load_map
 from golem.capabilities.grasping.base import Grasp
 from golem.capabilities.grasping.centroid import ACROSS, UP, grasp_pose
 from golem.capabilities.grasping.object_cloud import MIN_POINTS, PIXEL, across, bounds
+from golem.capabilities.perception.lift import standing_middle
 from golem.skills.context import Context
 from golem.skills.planned_motion import PlannedMotion
 from golem.skills.poses import moved, retracted
@@ -63,12 +64,7 @@ def top_of(points: Array) -> Array:
 
 
 def _laid_over(before: View, after: View, flat: Array, axis: Array) -> Array:
-    """Return the shift by the silhouettes; see `shift_between`.
-
-    Args:
-        flat: (3, 2) axes of the silhouettes, across `axis`.
-        axis: (3,) along which both look.
-    """
+    """Return the shift by silhouettes along `axis` (3,), whose axes are `flat` (3, 2); see `shift_between`."""
     low = np.minimum((before.thing @ flat).min(axis=0), (after.thing @ flat).min(axis=0)) - SEARCH
     high = np.maximum((before.thing @ flat).max(axis=0), (after.thing @ flat).max(axis=0)) + SEARCH
     size, edge = np.ceil((high - low) / PIXEL).astype(int) + 1, round(SEARCH / PIXEL)
@@ -151,11 +147,7 @@ LAST = 0.06
 
 
 class PalmLook:
-    """Brings one hand before a thing, and looks.
-
-    Attributes:
-        off: (2,) how far from where the head camera had it the thing was found, in odom [m].
-    """
+    """Brings one hand before a thing, and looks; it was `off` (2,) from where the head saw it, in odom [m]."""
 
     def __init__(self, context: Context, motion: PlannedMotion, side: Side, config: TakeThingConfig) -> None:
         self._context, self._motion, self._config = context, motion, config
@@ -178,10 +170,9 @@ class PalmLook:
         """
         c, context = self._config, self._context
         scene, seen_way = context.scene("head"), way
-        size = _size(target.points)
+        size, eye = _size(target.points), context.T_odom_base[:2, 3]
         for k in range(c.looks):
-            T = self._watching(target, way, yaw)
-            await self._motion.to({self._side: T}, c.travel_speed, near=NEAR)
+            await self._motion.to({self._side: self._watching(target, way, yaw)}, c.travel_speed, near=NEAR)
             palm = await palm_view(context, self._side, target.label, c.look_timeout)
             found = seen_again(palm, target, c.trust, size)
             if found is None:
@@ -190,8 +181,10 @@ class PalmLook:
             seen, upright = found
             off = (np.median(seen.points, axis=0) - np.median(target.points, axis=0))[:2]
             self._motion.displace(np.append(off, 0.0))
-            # The head sees the front of a thing, a hand its top: the middle of both is nearer than their medians.
-            self.off += (_middle(seen.points) - _middle(target.points))[:2]
+            # The head sees the front of a thing, a hand its top: their middles are the same, their medians are not.
+            hand = context.arms[self._side].pose[:2, 3]
+            self.off += standing_middle(seen.points, hand) - standing_middle(target.points, eye)
+            eye = hand
             target, scene = seen, palm
             seen_way = Rotation.align_vectors(upright[None], UP[None])[0].apply(way)
             if math.hypot(*off) < c.centred or k == c.looks - 1:
@@ -293,8 +286,3 @@ def _size(points: Array) -> tuple[float, float] | None:
         return None
     low, high = np.quantile(points[:, 2], (0.02, 0.98))
     return width(points), float(high - low) + PROUD
-
-
-def _middle(points: Array) -> Array:
-    """Return the middle (3,) of the bounds of points (n, 3), strays left out."""
-    return bounds(points).mean(axis=0)

@@ -135,6 +135,10 @@ class PickGoal:
         side: which hand; `either` takes the one that reaches the object and the container.
         avoid: x, y in odom of objects that are tried only where there is no other, one after the other [m].
         wanted: x, y in odom of the only objects that are tried, likewise; none: whatever is seen.
+        level: height in odom of what is wanted, for the head camera [m]; what is on another is not it; none: any.
+        container_at: x, y in odom of the only container that counts, likewise; none: whichever is seen best.
+        off: x, y in odom by how much a palm camera sees things elsewhere than the head camera does [m]. Where it is
+            known, what the palm camera shows elsewhere is not the object; none: it is not.
     """
 
     label: str = "screw"
@@ -142,11 +146,14 @@ class PickGoal:
     side: Hand = "right"
     avoid: tuple[float, ...] = ()
     wanted: tuple[float, ...] = ()
+    level: tuple[float, ...] = ()
+    container_at: tuple[float, ...] = ()
+    off: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         if not (self.label and self.container):
             raise ConfigError("A pick names the class of the object and that of its container.")
-        for places in (self.avoid, self.wanted):
+        for places in (self.avoid, self.wanted, self.container_at, self.off):
             floor_places("a pick", places)
 
 
@@ -185,7 +192,7 @@ class PickConfig:
         pull: length of the straight extraction [m]; longer than any screw.
         pull_speed: how fast [m/s].
         guard_force: force at which the first millimetres of a pull are given up [N]: loosened screws resist with 2 to
-            4 N, tight ones with 16 N until the fingers slip.
+            4 N, tight ones with 16 N until the fingers slip. Joints that rub turn back at 5 to 7 N at the hand.
         guard_length: how long these millimetres are, of the commanded pose [m]; 0 feels nothing.
         tolerance: distance from a commanded pose at which the arm counts as arrived [m].
         drop_margin: distance of the place where it lets go from the container's rim [m].
@@ -220,7 +227,7 @@ class PickConfig:
     close_timeout: float = 2.5
     pull: float = 0.06
     pull_speed: float = 0.05
-    guard_force: float = 10.0
+    guard_force: float = 14.0
     guard_length: float = 0.015
     tolerance: float = 0.006
     drop_margin: float = 0.04

@@ -1,4 +1,4 @@
-"""The end of a pick: where to let go of the object, and a look at whether it lies there."""
+"""The end of a pick: pulling the object out, where to let go of it, and a look at whether it lies there."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from golem.capabilities.planning.base import PlanRefused, Refusal
 from golem.interfaces.payloads import GripState
 from golem.skills.base import StageFailed
 from golem.skills.context import Context
-from golem.skills.pick_config import PickConfig, PickFailed, PickOutcome, PickReport, Sight
+from golem.skills.force_guard import ForceGuard
+from golem.skills.pick_config import PickConfig, PickFailed, PickOutcome, PickReport, Sight, slipped
 from golem.skills.pick_targets import Attempt, HandReach, PickChoice, positions, shift_of
 from golem.skills.poses import lifted, moved, turned
 from golem.skills.travel import Travel
@@ -35,20 +36,60 @@ NEAR = 0.12
 """What vanished this near to where the hand took something is that: the palm camera may have seen its neighbour [m]."""
 
 
+async def pull(
+    context: Context, config: PickConfig, travel: Travel, attempt: Attempt, up: Array, heights: list[float]
+) -> None:
+    """Pull straight out against the approach direction, then lift; the grip must hold.
+
+    The hand itself may stand askew in odom: a servo turns it to the ground it sees, by a wrist whose encoders are off.
+
+    Args:
+        up: (3,) against the direction of the approach, as the grasp was proposed, in odom.
+        heights: at which the palm camera saw it before each pull [m].
+
+    Raises:
+        PickFailed: it resists, or slips out of the fingers.
+    """
+    arm, hand = context.arms[attempt.side], context.hands[attempt.side]
+    # Off centre, one finger leans on its stop and the other pushes the object against its bore.
+    # A hand that stands on its fingertips is off where it is sent; without that its force counts from zero.
+    commanded = arm.commanded
+    pressed = max(0.0, float((arm.pose - commanded)[:3, 3] @ up))
+    await arm.move(moved(commanded, hand.status.offset * commanded[:3, 1] + pressed * up), config.pull_speed)
+    context.say("extract", "Pulling straight out.")
+    guard = await ForceGuard.at_rest(context, attempt.side, up, config.guard_force, config.guard_length)
+    await travel.line(
+        attempt.side,
+        moved(arm.commanded, config.pull * up),
+        config.pull_speed,
+        "extract",
+        stop=lambda: guard() or not hand.status.holding,
+    )
+    if guard.stuck:
+        text = f"The {attempt.label} does not move at {guard.largest:.0f} N."
+        raise PickFailed(slipped(heights), "extract", "grasp_method", text)
+    await arm.move(
+        lifted(arm.commanded, config.clearance - config.pull), config.travel_speed, stop=lambda: not hand.status.holding
+    )
+    if not hand.status.holding:
+        text = f"The {attempt.label} slipped out of the fingers."
+        raise PickFailed(slipped(heights), "extract", "grasp_method", text)
+
+
 async def place(
-    context: Context, config: PickConfig, travel: Travel, attempt: Attempt, seen: Array, choice: PickChoice
+    context: Context, config: PickConfig, travel: Travel, attempt: Attempt, seen: Array, choice: PickChoice, off: Array
 ) -> None:
     """Carry what a hand holds over the container and let go.
 
     Args:
         seen: (3,) where the palm camera saw what the head camera had chosen, in odom [m].
+        off: (3,) by how much it was known to see things elsewhere [m].
 
     Raises:
         StageFailed: no place above the container is reached, or the object was lost.
     """
     container, arm, hand = choice.container, context.arms[attempt.side], context.hands[attempt.side]
-    others = np.array([o.target.position for o in choice.attempts])
-    shift = shift_of(seen, attempt.target.position, others)
+    shift = off + shift_of(seen - off, attempt.target.position, choice.seen)
     travel.displace(shift)
     spots = container.places(config.drop_margin) + shift
     goals: list[Array] = []
@@ -68,8 +109,7 @@ async def place(
         raise
     await _nearer(context, config, travel, attempt, container.sighting.position[:2] + shift[:2])
     if not hand.status.holding:
-        text = f"The {attempt.label} was lost on the way."
-        raise PickFailed(PickOutcome.SLIPPED, "place", "grasp_method", text)
+        raise PickFailed(PickOutcome.SLIPPED, "place", "grasp_method", f"The {attempt.label} was lost on the way.")
     hand.open(config.release_gap)
     await context.until(lambda: hand.status.state is GripState.OPEN, 2.0)
 

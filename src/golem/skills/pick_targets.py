@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,8 @@ from golem.interfaces.payloads import Detections
 from golem.skills.context import Context
 from golem.skills.pick_config import PickConfig, PickFailed, PickGoal, PickOutcome, Tried
 from golem.skills.planned_motion import PlannedMotion
-from golem.skills.poses import floor_places, stands_at
+from golem.skills.poses import counts_at, floor_places, stands_at
+from golem.skills.stance_choice import seen_from
 from golem.types import SIDES, Array, LocalizedObject, Side
 
 BRIM = 0.01
@@ -153,11 +155,7 @@ class HandReach:
         return np.array([any(load_map().serves("right", p + d) for d in around) for p in over])
 
     def drop_order(self, side: Side, places: Array, most: int) -> Array:
-        """Return up to `most` of `places` (n, 3) to try: half of them as they come, surely in reach, then near ones.
-
-        Args:
-            places: in odom [m].
-        """
+        """Return up to `most` of `places` (n, 3) in odom to try: half as they come, surely in reach, then near ones."""
         over = self._in_base(side, places + (0.0, 0.0, self._config.drop_height))
         surely = np.flatnonzero(self.drops(side, places, slack=False)).tolist()
         away = np.hypot(over[:, 0] - self._config.comfort[0], over[:, 1] - self._config.comfort[1])
@@ -180,8 +178,26 @@ MOST = 0.5
 """A hand that reaches this share of the container's places surely reaches some, however much the head camera is off."""
 SAME = 0.04
 """What two looks show this near to each other is one object [m]; screws stand 9 cm apart."""
+CLOSE = 0.015
+"""The same where it is known which one is wanted [m]: real ones stand 24 mm apart, and one tried twice is only slow."""
 WANTED = 0.045
 """How far from where it is wanted, or listed, the head camera may show an object [m]: half a pitch."""
+LEVEL = 0.04
+"""How far above or below its level an object may be seen [m]: those of a real pack are 65 mm apart."""
+BESIDE = 0.12
+"""How far from where it is known to be a container may be seen [m]: half a length, they stand side by side."""
+ALIKE = {"screw": ("nut",), "nut": ("screw",)}
+"""Classes that cameras mistake for each other."""
+
+
+def names_of(label: str, wanted: Sequence[float] | Array) -> tuple[str, ...]:
+    """Return the classes that count as `label`: where the places are known that are `wanted`, those alike, too."""
+    return (label, *(ALIKE.get(label, ()) if len(wanted) else ()))
+
+
+def called(thing: LocalizedObject, label: str) -> LocalizedObject:
+    """Return a thing under another class."""
+    return thing if thing.label == label else replace(thing, detection=replace(thing.detection, label=label))
 
 
 @dataclass(frozen=True, slots=True)
@@ -277,9 +293,11 @@ class TargetChoice:
 
     async def _look_around(self, context: Context, goal: PickGoal, view: _View) -> _View:
         """Turn the torso to either side until enough is seen, and back; the arms come along."""
-        motion, ahead = PlannedMotion(context), context.commanded_joints.copy()
+        motion, ahead, turns = PlannedMotion(context), context.commanded_joints.copy(), self._turns(context, goal, view)
+        if not turns:
+            return view
         context.say("detect", f"{view.problem or f'Few {goal.label}s are seen.'} Looking around.")
-        for turn in (self._config.turn, -self._config.turn):
+        for turn in turns:
             turned = ahead.copy()
             turned[TORSO] += turn
             with suppress(PlanRefused):
@@ -290,6 +308,16 @@ class TargetChoice:
         with suppress(PlanRefused):
             await motion.to_joints(ahead, (), self._config.travel_speed)
         return view
+
+    def _turns(self, context: Context, goal: PickGoal, view: _View) -> list[float]:
+        """Return how the torso may turn to see more [rad]; what is wanted may be in view, and not be there."""
+        turns, wanted = [self._config.turn, -self._config.turn], floor_places("a pick", goal.wanted)
+        if not len(wanted) or not view.objects or view.container is None:
+            return turns
+        height = float(np.median([o.position[2] for o in view.objects]))
+        T, places = context.T_odom_base, np.column_stack([wanted, np.full(len(wanted), height)])
+        here, local = np.zeros((1, 3)), (places - T[:3, 3]) @ T[:3, :3]
+        return [] if seen_from(here, local, 0.0).any() else [t for t in turns if seen_from(here, local, t).any()]
 
     def _enough(self, goal: PickGoal, view: _View) -> bool:
         """Return whether nothing is missing, and not so few objects are seen that others may have been overlooked."""
@@ -304,7 +332,8 @@ class TargetChoice:
                 PickOutcome.FAILED, "detect", "localizer", "The head camera gave no detections in time."
             ),
         )
-        with context.watch("head", goal.label, goal.container, doubtful=(goal.container,)) as eye:
+        names = names_of(goal.label, goal.wanted)
+        with context.watch("head", *names, goal.container, doubtful=(goal.container,)) as eye:
             end = context.t + self._config.look_timeout
             while view.problem is not None:
                 sightings = await eye.look(end - context.t)
@@ -314,17 +343,21 @@ class TargetChoice:
         return view
 
     def _added(self, context: Context, goal: PickGoal, view: _View, sightings: Detections) -> _View:
-        container, objects = view.container, list(view.objects)
+        container, objects, at = view.container, list(view.objects), floor_places("a pick", goal.container_at)
         containers = [
-            Container.of(o, self._config.container_radius) for o in sightings.objects if o.label == goal.container
+            Container.of(o, self._config.container_radius)
+            for o in sightings.objects
+            if o.label == goal.container and counts_at(o.position, at, BESIDE)
         ]
         believed = [c for c in containers if c.box is not None or c.sighting.detection.score >= self._config.sure]
         container = max(believed, key=lambda c: c.sighting.detection.score, default=container)
-        for new in (o for o in sightings.objects if o.label == goal.label):
-            if all(np.linalg.norm(new.position - known.position) > SAME for known in objects):
-                objects.append(new)
         reach, wanted = HandReach(context, self._config), floor_places("a pick", goal.wanted)
-        mine = [o for o in objects if not len(wanted) or stands_at(o.position, wanted, WANTED)]
+        names, apart = names_of(goal.label, wanted), CLOSE if len(wanted) else SAME
+        for new in (o for o in sightings.objects if o.label in names):
+            if all(np.linalg.norm(new.position - known.position) > apart for known in objects):
+                objects.append(called(new, goal.label))
+        mine = [o for o in objects if counts_at(o.position, wanted, WANTED)]
+        mine = [o for o in mine if all(abs(float(o.position[2]) - level) < LEVEL for level in goal.level)]
         attempts = [
             Attempt(goal.label, goal.container, side, o)
             for side in (SIDES if goal.side == "either" else (goal.side,))

@@ -20,7 +20,7 @@ from golem.robots.model.magpie_model import MAX_GAP
 from golem.skills.base import SkillCancelled, SkillResult, StageFailed
 from golem.skills.context import Context
 from golem.skills.force_guard import ForceGuard, close_hand
-from golem.skills.poses import at_height, lifted, retracted
+from golem.skills.poses import at_height, head_off, lifted, retracted
 from golem.skills.ware_sight import surface_below
 from golem.types import SIDES, Array, Side
 
@@ -75,7 +75,8 @@ class PlaceGoal:
         above: height of its top above the fingertips, as `take` reports it [m].
         aside: where its middle is beside the fingertips along the hand's x and y axes, as `take` reports it [m]; empty:
             between them.
-        off: how far from where the head camera has them the hand finds things, in odom, as `take` reports it [m].
+        off: how far from where the head camera has them the hand finds things, as a share of their distance from the
+            robot, outwards and to its left, as `take` reports it.
         radius: half of its width, as `take` reports it [m]; 0 where it is not known.
         label: what it is, in words that the localizer knows: the head camera is asked for a picture of it at the end.
             Without one the newest picture that somebody asked for says whether it stands.
@@ -162,9 +163,9 @@ class SetDown:
     Goal, Result = PlaceGoal, PlaceReport
 
     def __init__(self, config: PlaceConfig | None = None) -> None:
-        """Take distances, speeds and forces from `config`."""
         self._config = config or PlaceConfig()
         self._report = PlaceReport()
+        self._off = np.zeros(3)
 
     def timeout(self, goal: PlaceGoal) -> float:
         """Return the time it may take [s]; see `Skill`."""
@@ -213,11 +214,11 @@ class SetDown:
         if goal.frame == "base_link":
             spot = T[:3, :3] @ spot + T[:3, 3]
         # From here on the place is where this hand would find it.
-        off = np.array([*(goal.off or (0.0, 0.0)), 0.0])
-        spot += HANDS * off
+        self._off = np.append(head_off(T, spot, goal.off), 0.0)
+        spot += HANDS * self._off
         context.say("detect", "Looking at the place.", target=spot.tolist())
         motion.look([(hand, IN_HAND)])
-        motion.displace(off)
+        motion.displace(self._off)
         scene = self._scene(context, goal, context.arms[side].pose)
         level = surface_below(scene, spot)
         if level is None:
@@ -270,11 +271,9 @@ class SetDown:
         with blaming("carry"):
             raise refused
 
-    @staticmethod
-    def _scene(context: Context, goal: PlaceGoal, T: Array) -> Array:
+    def _scene(self, context: Context, goal: PlaceGoal, T: Array) -> Array:
         """Return the points (n, 3) in odom that the head camera shows, as this hand finds them, less what it holds."""
-        scene = context.scene("head")
-        scene = scene + (*goal.off, 0.0) if goal.off else scene
+        scene = context.scene("head") + self._off
         beside = np.append(T[:2, :2] @ (goal.aside or (0.0, 0.0)), 0.0)
         for middle, radius in ((T[:3, 3], IN_HAND), (T[:3, 3] + beside, IN_BOWL)):
             # Distance from what is there and from what hangs below it.
@@ -349,12 +348,8 @@ class SetDown:
         await motion.rest(posture("home"), side, c.travel_speed, "release")
 
     def _stands(self, context: Context, goal: PlaceGoal, spot: Array) -> None:
-        """Look whether it stands where it was set down, as far as the head camera shows the place.
-
-        Raises:
-            StageFailed: nothing stands there, or something much lower than what was held.
-        """
-        scene = context.scene("head") + ((*goal.off, 0.0) if goal.off else 0.0)
+        """Look whether it stands, as the head camera shows. Raises StageFailed: nothing does, or what is much lower."""
+        scene = context.scene("head") + self._off
         near = scene[np.linalg.norm(scene[:, :2] - spot[:2], axis=1) < goal.radius + NEARBY]
         height = near[:, 2] - spot[2]
         if np.count_nonzero(np.abs(height) < PROUD) <= MIN_POINTS:

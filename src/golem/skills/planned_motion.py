@@ -86,11 +86,7 @@ class Then:
 
 
 class PlannedMotion:
-    """Plans with the stack's planner and moves through the context.
-
-    Attributes:
-        world: what stands around, in base_link; empty until `look` was called.
-    """
+    """Plans with the stack's planner and moves through the context; `world` is in base_link, empty until `look`."""
 
     def __init__(self, context: Context) -> None:
         self._context = context
@@ -99,11 +95,7 @@ class PlannedMotion:
         self.world = World()
 
     def look(self, spared: Sequence[tuple[Array, float]] = ()) -> int:
-        """Take what the head camera shows now for the world; return how many cells of it are occupied.
-
-        Args:
-            spared: what the hand is to go to: centres (3,) in odom and radii [m].
-        """
+        """Take the cells that the head camera shows, without `spared` (centres, radii in odom [m]); return how many."""
         context = self._context
         T = np.linalg.inv(context.T_odom_base)
         points = context.scene("head") @ T[:3, :3].T + T[:3, 3]
@@ -218,8 +210,7 @@ class PlannedMotion:
         off = float(np.abs(context.joints - plan.q[0]).max())
         await context.follow(plan.times + (0.0 if off < GIVEN else off / YIELD), plan.q, plan.dq)
         for side in sides:
-            here = self._goals.pose(side, plan.q[-1])
-            context.arms[side].stays_at(context.T_odom_base @ here)
+            context.arms[side].stays_at(context.T_odom_base @ self._goals.pose(side, plan.q[-1]))
 
     async def line(
         self,
@@ -244,8 +235,7 @@ class PlannedMotion:
         context = self._context
         q = context.commanded_joints
         space = JointSpace(self._robot, q, self.world if avoid else None)
-        T = np.linalg.inv(context.T_odom_base) @ T_goal
-        self._lines.check(side, T, q, v_max, 1.5, *tolerance, space)
+        self._lines.check(side, np.linalg.inv(context.T_odom_base) @ T_goal, q, v_max, 1.5, *tolerance, space)
         await context.arms[side].move(T_goal, v_max, stop=stop)
 
     def _goal_postures(

@@ -26,11 +26,7 @@ Frame = Literal["odom", "map"]
 
 
 def check_numbers(x: float, y: float, yaw: float, timeout: float) -> None:
-    """Check the numbers of a goal.
-
-    Raises:
-        ConfigError: one is not finite, or there is no time to walk in.
-    """
+    """Check the numbers of a goal. Raises ConfigError: one is not finite, or there is no time to walk in."""
     rows = (("x", x), ("y", y), ("yaw", yaw), ("timeout", timeout))
     require("goal of a walk: its ", *((name, v, math.isfinite(v), "a finite number") for name, v in rows))
     fine = 0.0 < timeout <= MAX_TIMEOUT
@@ -38,12 +34,7 @@ def check_numbers(x: float, y: float, yaw: float, timeout: float) -> None:
 
 
 def check_reach(context: Context, distance: float, timeout: float) -> None:
-    """Check that the legs can walk, and get `distance` [m] far within `timeout` [s] at all.
-
-    Raises:
-        ConfigError: they cannot.
-        StageFailed: they do not report.
-    """
+    """Check that legs get `distance` [m] far in `timeout` [s]. Raises ConfigError: they cannot; StageFailed: silent."""
     context.legs.check_walking()
     speed = context.legs.status.speed
     reach = speed * timeout

@@ -31,6 +31,11 @@ def stands_at(position: Array, places: Array, within: float) -> bool:
     return bool((np.linalg.norm(places - position[:2], axis=1) < within).any())
 
 
+def counts_at(position: Array, places: Array, within: float) -> bool:
+    """Return whether a thing there counts: it `stands_at` one of the `places`, or none is named."""
+    return not len(places) or stands_at(position, places, within)
+
+
 def lifted(T: Array, height: float) -> Array:
     """Return pose `T` (4, 4) raised by `height` [m] along odom z."""
     return at_height(T, T[2, 3] + height)
@@ -61,3 +66,23 @@ def turned(T: Array, angle: float) -> Array:
     out = T.copy()
     out[:3, :3] = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ T[:3, :3]
     return out
+
+
+def share_off(T: Array, place: Array, off: Array) -> tuple[float, float]:
+    """Return what a head camera is off by, as a share of a thing's distance, outwards and to the left of the robot.
+
+    Args:
+        T: (4, 4) pose of base_link in odom.
+        place: (2,) or (3,) where the thing is in odom [m].
+        off: (2,) how far that is from where the camera had it, in odom [m].
+    """
+    R = T[:2, :2].T
+    share = complex(*(R @ off)) / complex(*(R @ (place[:2] - off - T[:2, 3])))
+    return share.real, share.imag
+
+
+def head_off(T: Array, place: Array, share: Sequence[float]) -> Array:
+    """Return how far (2,) in odom a thing is from where the head camera has it, at `place` [m]; see `share_off`."""
+    R = T[:2, :2]
+    off = complex(*(R.T @ (place[:2] - T[:2, 3]))) * complex(*share)
+    return R @ (off.real, off.imag)

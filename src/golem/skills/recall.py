@@ -49,11 +49,7 @@ class RecalledPlaces:
 
 
 async def memory_status(context: Context) -> MemoryStatus:
-    """Return what the memory tells of itself.
-
-    Raises:
-        StageFailed: it does not report.
-    """
+    """Return what the memory tells of itself. Raises StageFailed: it does not report."""
     topic = topics.MEMORY_STATUS
     await context.until(lambda: context.bus.latest(topic) is not None, FIRST_REPORT)
     status = context.bus.latest(topic)

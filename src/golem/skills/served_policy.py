@@ -74,11 +74,7 @@ class PolicySkill:
         return SkillResult(True, "done", None, f"The policy moved the robot for {goal.seconds:g} s.")
 
     def _do(self, context: Context, action: Array) -> None:
-        """Do one action.
-
-        Raises:
-            ActionRefused: a hand cannot be meant to go there.
-        """
+        """Do one action. Raises ActionRefused: a hand cannot be meant to go there."""
         goals = [context.T_odom_base @ palm_pose(action[9 * k : 9 * k + 9]) for k in range(2)]
         for side, goal in zip(SIDES, goals, strict=True):
             check_near(goal, context.arms[side].pose, FAR)

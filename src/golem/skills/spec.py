@@ -51,11 +51,7 @@ class SkillSpec:
 
 
 def schema_of(kind: Any) -> Schema:
-    """Return the schema of the dataclass `kind`.
-
-    Raises:
-        TypeError: it is none, or a field is of a type that no goal can have; names it.
-    """
+    """Return the schema of the dataclass `kind`. Raises TypeError: it is none, or has a field that no goal can have."""
     if not (inspect.isclass(kind) and dataclasses.is_dataclass(kind)):
         raise TypeError(f"{getattr(kind, '__name__', kind)!s} is no dataclass")
     hints, notes = typing.get_type_hints(kind), _notes(kind)

@@ -82,8 +82,7 @@ def best_stance(
         tray: (3,) middle of the container in base_link [m]; None where it is not known.
         drops: how much lower than now the robot may stand [m]; the first is kept where another wins little.
     """
-    foot = edge.to(PlanarPose(0.0, 0.0, 0.0)).y
-    offs = np.arange(-ASIDE, ASIDE + 1e-9, GRID) + foot
+    offs = np.arange(-ASIDE, ASIDE + 1e-9, GRID) + edge.to(PlanarPose(0.0, 0.0, 0.0)).y
     standoffs = np.arange(STANDOFF[0], STANDOFF[1] + 1e-9, 0.5 * GRID)
     tried = [edge @ PlanarPose(-d, y, turn) for d, y, turn in itertools.product(standoffs, offs, TURNS)]
     return _best(tried, screws, weights, tray, drops)

@@ -21,7 +21,7 @@ from golem.robots.model.magpie_model import MAX_GAP
 from golem.skills.base import SkillCancelled, SkillResult, StageFailed
 from golem.skills.context import Context
 from golem.skills.force_guard import close_hand
-from golem.skills.poses import lifted, retracted
+from golem.skills.poses import lifted, retracted, share_off
 from golem.skills.take_config import TakeGoal, TakeReport, TakeThingConfig
 from golem.skills.ware_sight import find, surface_below
 from golem.types import SIDES, Array, LocalizedObject, Side
@@ -49,8 +49,7 @@ def reached_first(context: Context, side: Side, grasps: Sequence[Grasp], before:
         starts[:, 0] = q[0] + turn
         found = [reached(grasp) for grasp in grasps]
         if any(found):
-            order = sorted(range(len(grasps)), key=lambda k: not found[k])
-            return [grasps[k] for k in order]
+            return [grasps[k] for k in sorted(range(len(grasps)), key=lambda k: not found[k])]
     return list(grasps)
 
 
@@ -77,7 +76,6 @@ class Take:
     Goal, Result = TakeGoal, TakeReport
 
     def __init__(self, config: TakeThingConfig | None = None) -> None:
-        """Take distances, speeds and forces from `config`."""
         self._config = config or TakeThingConfig()
         self._report = TakeReport()
         self.force = self._config.force
@@ -218,7 +216,7 @@ class Take:
             look = PalmLook(context, motion, side, c)
             if c.look_again:
                 target, scene, way = await look.at(target, way, yaw)
-                self._report.off_x, self._report.off_y = look.off.tolist()
+                self._report.off_x, self._report.off_y = share_off(context.T_odom_base, target.position, look.off)
         grasps = await context.propose(method, target, side, yaw, (way[0], way[1], way[2]), scene)
         if not grasps:
             raise StageFailed("approach", "grasp_method", f"No grasp was proposed for the {target.label}.")

@@ -100,7 +100,8 @@ class TakeReport:
         force: what each finger was told to press with [N].
         radius: half of its width as seen, across where it is widest [m].
         aside_x, aside_y: where its middle is beside the fingertips, along the hand's x and y axes [m].
-        off_x, off_y: how far from where the head camera had it the hand found it, in odom [m].
+        off_x, off_y: how far from where the head camera had it the hand found it, outwards from the robot and to its
+            left, as a share of its distance: a camera that looks aside has all things turned about the robot.
     """
 
     side: str = ""

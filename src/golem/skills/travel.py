@@ -37,11 +37,7 @@ class Travel(Protocol):
     """Moves hands; every pose is that of a grasp frame in odom, (4, 4)."""
 
     async def begin(self, speed: float) -> None:
-        """Bring arms that hang to where work begins: they are where hands return to.
-
-        Raises:
-            StageFailed: there is no way.
-        """
+        """Bring hanging arms to where work begins and hands return to. Raises StageFailed: there is no way."""
         ...
 
     def look(self, targets: Sequence[Array]) -> None:
@@ -53,19 +49,11 @@ class Travel(Protocol):
         ...
 
     async def over(self, side: Side, T_above: Array, T_object: Array, speed: float) -> None:
-        """Bring an empty hand above an object, from where it can go straight down to `T_object` and up again.
-
-        Raises:
-            StageFailed: it cannot be brought there.
-        """
+        """Bring an empty hand to where it can go straight to `T_object` and up again. Raises StageFailed: it cannot."""
         ...
 
     async def carry(self, side: Side, goals: Sequence[Array], speed: float) -> None:
-        """Bring a hand that holds something to the first of some poses that it gets to.
-
-        Raises:
-            StageFailed: it cannot be brought to any.
-        """
+        """Bring a hand that holds something to the first of some poses it gets to. Raises StageFailed: to none."""
         ...
 
     async def line(
@@ -87,12 +75,7 @@ class LineTravel:
     """Up to a height, across, and down, blind to what is in the way."""
 
     def __init__(self, context: Context, height: float, tolerance: float) -> None:
-        """Remember where the hands are.
-
-        Args:
-            height: least height of a hand that moves across, in odom [m].
-            tolerance: distance from a pose at which the arm counts as arrived [m].
-        """
+        """Remember where the hands are, which move across above `height` in odom and arrive within `tolerance` [m]."""
         self._context, self._height, self._tolerance = context, height, tolerance
         self._homes = {side: context.arms[side].pose for side in SIDES}
 
@@ -136,12 +119,7 @@ class PlannedTravel:
     """Around what the head camera shows, with lines that are checked before the hand moves."""
 
     def __init__(self, context: Context, lines: LineTravel, tolerance: float) -> None:
-        """Remember where the arms are.
-
-        Args:
-            lines: the way home when there is no planned one.
-            tolerance: distance from a pose at which the arm counts as arrived [m].
-        """
+        """Remember where the arms are; they arrive within `tolerance` [m], without a planned way home by `lines`."""
         # Numba takes a second to import, and lines do without it.
         from golem.skills.planned_motion import PlannedMotion
 

@@ -26,6 +26,8 @@ WIDE = 0.10
 """Least width of a level plane that things may stand on [m]: the cap of a tall bottle is all that a hand above sees."""
 HYPOTHESES = 400
 """Planes through three points that are tried."""
+FINE = 0.005
+"""Cells in which points of a palm camera hang together [m]: it is near, and things stand close to each other."""
 STRAY = 8
 """Pieces that are looked at; some are too small to be a thing."""
 ALIKE = 1.6
@@ -48,14 +50,11 @@ def surface_below(points: Array, place: Array, radius: float = ABOUT) -> float |
 async def find(
     context: Context, label: str, near: tuple[float, float] | None, timeout: float
 ) -> LocalizedObject | None:
-    """Return the thing of a class that the head camera shows, the one nearest to where it is expected.
+    """Return the thing of a class that the head camera shows, nearest to where it is expected; None without one.
 
     Args:
         near: x, y in odom where it is expected [m]; None: the one that is told most surely.
         timeout: how long to look [s].
-
-    Returns:
-        The thing; None where none is shown.
 
     Raises:
         StageFailed: the camera gave no detections.
@@ -126,7 +125,7 @@ def _pieces(around: Array, middle: Array, upright: Array, trust: float) -> list[
         if not len(around):
             break
         # Seen from above a bottle is a cap over a shoulder, with nothing between them: pieces are those of its plan.
-        own = piece_at(around - np.outer((around - middle) @ upright, upright), middle)
+        own = piece_at(around - np.outer((around - middle) @ upright, upright), middle, FINE)
         cloud, around = around[own], around[~own]
         away = float(np.hypot(*(np.median(cloud, axis=0) - middle)[:2]))
         if len(cloud) >= MIN_POINTS and away <= trust:
@@ -155,8 +154,7 @@ def leaning_surface(points: Array) -> tuple[Array, float] | None:
     cubes = spaced(points, 0.008)
     if len(cubes) < MIN_POINTS:
         return None
-    rng = np.random.default_rng(0)
-    a, b, c = cubes[rng.integers(0, len(cubes), (3, HYPOTHESES))]
+    a, b, c = cubes[np.random.default_rng(0).integers(0, len(cubes), (3, HYPOTHESES))]
     normals = np.cross(b - a, c - a)
     normals *= np.sign(normals[:, 2:3])
     size = np.linalg.norm(normals, axis=1)

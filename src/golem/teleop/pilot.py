@@ -98,11 +98,7 @@ class HandPilot:
         self._lock, self._orders = threading.Lock(), list[str]()
 
     def hear(self, who: str, message: object, now: float) -> None:
-        """Take a message of the window `who` at `now` [s], by a clock that never jumps.
-
-        Raises:
-            BadMessage: it makes no sense.
-        """
+        """Take a message of window `who` at `now` [s], which never jumps. Raises BadMessage: it makes no sense."""
         with self._lock:
             window = self._windows.setdefault(who, _Window(now))
             window.heard, window.hold, window.said = now, False, {}
@@ -164,11 +160,7 @@ _WHOLE = {"twist": (3, 1.0), "lift": (0, 1.0), "waist": (0, 1.0)}
 
 
 def checked(message: object) -> Mapping[str, Any]:
-    """Return a message if it makes sense: a map whose numbers are finite, in range, and as many as they should be.
-
-    Raises:
-        BadMessage: it does not.
-    """
+    """Return a message of as many numbers as it takes, finite and in range. Raises BadMessage: it makes no sense."""
     if not isinstance(message, dict) or not all(isinstance(message.get(side, {}), dict) for side in SIDES):
         raise BadMessage("A message is a map, and each hand's part is one.")
     for part, sizes in ((message, _WHOLE), *((message.get(side, {}), _HAND) for side in SIDES)):

@@ -22,7 +22,7 @@ from golem.dashboard.server import WORLD, gizmo_pose, place_gizmo
 from golem.datasets.commands import TASK, PictureOptions
 from golem.datasets.episode_writer import DatasetWriter
 from golem.datasets.sampling import StackRecorder
-from golem.errors import ConfigError, MissingExtra
+from golem.errors import ConfigError, needs
 from golem.interfaces import topics
 from golem.middleware.web_gate import LOCAL, TokenGate, is_loopback
 from golem.run import no_display, shown
@@ -46,13 +46,11 @@ class PilotPage:
             ConfigError: the address cannot be had.
             MissingExtra: the extra `view` is not installed.
         """
-        try:
+        with needs("", "view"):
             from websockets.datastructures import Headers
             from websockets.exceptions import ConnectionClosed
             from websockets.http11 import Response
             from websockets.sync.server import serve
-        except ModuleNotFoundError as error:
-            raise MissingExtra(error.name or "websockets", "view") from error
         self._pilot, self._status, self._numbers = pilot, status, itertools.count(1)
         self._room, self._gone = threading.BoundedSemaphore(WINDOWS), (ConnectionClosed, OSError)
         body = (files("golem.teleop") / "pilot.html").read_text(encoding="utf-8").replace("%VIEW%", view).encode()
@@ -182,12 +180,7 @@ class TeleopConfig:
 
 
 class Teleop:
-    """One robot that is driven by hand.
-
-    Attributes:
-        pilot, driving: who drives, and how.
-        page, view: what serves the windows.
-    """
+    """One robot that is driven by hand."""
 
     def __init__(self, config: TeleopConfig, running: LockstepRunner, robot: Any) -> None:
         """Serve; errors as for `LiveView`, `PilotPage` and `DatasetWriter`."""

@@ -10,7 +10,7 @@ from tests.capabilities.legs.recorder import Recorder, crouching, still
 
 from golem.capabilities.legs.locomotion import FootSeparation, FootSeparationConfig, Locomotion, LocomotionConfig
 from golem.interfaces.payloads import LegCommand
-from golem.robots.model.leg_dynamics import LegDynamics
+from golem.robots.model.leg_kernel import LegDynamics
 from golem.types import LEGS, SIDES, Array, LowState, Twist
 
 ROLLS = {"left": 2, "right": 8}

@@ -289,7 +289,8 @@ def test_a_twist_that_waited_for_the_legs_is_reached_at_the_allowed_acceleration
 
 
 def test_a_hand_over_inside_another_waits_for_whoever_walks_in_the_end() -> None:
-    inner = {"walk": {"use": RECORDER}, "stand": {"use": RECORDER}}
+    slow = GaitConfig(period=1.3)
+    inner = {"walk": {"use": RECORDER, "options": {"gait": slow}}, "stand": {"use": RECORDER}}
     outer = HandoverConfig(HandoverPart("handover", inner), HandoverPart(RECORDER))
     legs = Handover(outer)
     layer = Locomotion(legs, LocomotionConfig(trim=VelocityIntegratorConfig(gain=0.0)))
@@ -298,6 +299,7 @@ def test_a_hand_over_inside_another_waits_for_whoever_walks_in_the_end() -> None
     for _ in range(100):
         layer.step(state, base, Twist(0.5), DT)
     assert legs.follows and layer.applied == Twist(0.5)
+    assert legs.gait == slow and layer.motion.stepping  # not the clock of who stood inside when the legs were taken
 
 
 def test_a_controller_that_starts_too_slowly_is_left_alone_again() -> None:

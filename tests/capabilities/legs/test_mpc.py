@@ -10,8 +10,7 @@ from tests.capabilities.legs.floor_plant import FloorPlant
 
 from golem import registry
 from golem.capabilities.legs.base import STANDING, Envelope, LowerBody
-from golem.capabilities.legs.mpc.controller import FAILURES, MPC, MPCConfig, PlanningError
-from golem.capabilities.legs.mpc.planner import Method, PlannerConfig
+from golem.capabilities.legs.mpc.controller import FAILURES, MPC, Method, MPCConfig, PlannerConfig, PlanningError
 from golem.errors import ConfigError
 from golem.evaluation.harness.copies import CAN_COPY, in_a_copy
 from golem.finite import NotFinite

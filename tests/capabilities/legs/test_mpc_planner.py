@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from golem.capabilities.legs.mpc.planner import Planner, PlannerConfig
+from golem.capabilities.legs.mpc.controller import Planner, PlannerConfig
 from golem.errors import ConfigError
 from golem.types import Array
 

@@ -66,6 +66,12 @@ BROKEN = {
 }
 
 
+def test_a_folder_is_no_map(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ConfigError, match=r"The map '\..*' cannot be read: No such file or directory\."):
+        load_map(Path("."))
+
+
 @pytest.mark.parametrize("what", BROKEN)
 def test_a_broken_map_is_refused_in_a_sentence(what: str, tmp_path: Path) -> None:
     (tmp_path / "m.pgm").write_bytes(b"P5\n2 1\n255\n" + bytes([0, 254]))

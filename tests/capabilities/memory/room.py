@@ -52,14 +52,20 @@ def look(
         centre = inverse[:3, :3] @ at + inverse[:3, 3]
         _draw(depth, centre, radius)
         if name and (seen is None or name in seen):
-            surface = centre * (1.0 - radius / np.linalg.norm(centre))
-            points = surface + 0.5 * radius * np.random.default_rng(0).standard_normal((40, 3))
+            points = centre + radius * _half_ball(-centre)
             pixel = project(HEAD, centre)
             detection = Detection(name.rstrip("0123456789"), 0.9, np.array([*pixel - 10, *pixel + 10]), pixel)
             out = [believed[:3, :3] @ p + believed[:3, 3] for p in (centre, *points)]
             found.append(LocalizedObject(detection, t, out[0], np.array(out[1:])))
     rgb = np.zeros((HEAD.height, HEAD.width, 3), np.uint8)
     return Observation(RgbdImage(t, HEAD, rgb, depth, believed), found, labels, pose_sigma)
+
+
+def _half_ball(towards: Array) -> Array:
+    """Return (n, 3) points of the unit ball's half that is `towards` (3,)."""
+    directions = np.random.default_rng(0).standard_normal((800, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    return directions * np.sign(directions @ towards)[:, None]
 
 
 def _draw(depth: np.ndarray, centre: Array, radius: float) -> None:

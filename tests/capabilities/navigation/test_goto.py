@@ -244,11 +244,3 @@ def test_a_push_during_a_stop_is_not_learned() -> None:
         if course.arrived:
             break
     assert pushed and error(walker, PlanarPose(1.0, 0.0, 0.0))[0] < 0.05
-
-
-def test_legs_that_come_no_nearer_are_told_to_stand_after_a_while() -> None:
-    navigator, end = GoTo(), 30.0
-    navigator.start(PlanarPose(0.05, 0.0, 0.0))
-    told = [navigator.step(NavInputs(PlanarPose(0.0, 0.0, 0.0), True), 0.01).twist for _ in range(round(end / 0.01))]
-    stands = [k * 0.01 for k, twist in enumerate(told) if twist == Twist()]
-    assert 10.0 < stands[0] < 13.0  # 1.2 a second from 5 s on make 15 mm more than 50

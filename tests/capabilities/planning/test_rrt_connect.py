@@ -11,9 +11,9 @@ import pytest
 from golem.capabilities.arms.arm_kinematics import UpperKinematics
 from golem.capabilities.arms.goal_postures import GoalPostures
 from golem.capabilities.arms.postures import downward, posture
+from golem.capabilities.arms.trajectory import interpolate
 from golem.capabilities.collision.obstacles import Obstacle, World, cloud_grid
 from golem.capabilities.planning.base import Held, Plan, PlanRefused, PlanRequest, Refusal
-from golem.capabilities.planning.hermite import interpolate
 from golem.capabilities.planning.path_planner import fine_points
 from golem.capabilities.planning.rrt_connect import RrtConnect, Straight
 from golem.capabilities.planning.rules import Balanced, HandBox, HandUpright

@@ -72,7 +72,8 @@ def test_a_module_that_is_wrong_ends_in_1_and_its_line_is_shown(
     path.write_text(BROKEN)
     assert run(monkeypatch, "grasp_method", f"{path}:Mine") == 1
     said = capsys.readouterr().out
-    assert "answers soundly" in said and f'File "{path}", line 6, in propose' in said
+    assert "not asked: 'answers soundly' failed" in " ".join(said.split())
+    assert f'File "{path}", line 6, in propose' in said
 
 
 def test_json_is_all_that_is_printed(

@@ -77,7 +77,8 @@ def test_nothing_is_overwritten(there: Path) -> None:
     ("slot", "name", "sentence"),
     [
         ("hnad", "mine", "Did you mean 'hand'?"),
-        ("hand", "My-Hand", "lower-case words joined by _, e.g. my_hand; not 'My-Hand'"),
+        ("hand", "My-Hand", "lower-case words joined by _ and no word of Python's; not 'My-Hand'"),
+        ("hand", "class", "no word of Python's; not 'class'"),
         ("hand", "import", "not 'import'"),
     ],
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from golem.evaluation.episodes.film_strip import project
+from golem.evaluation.episodes.last_seconds import project
 from golem.robots.mujoco.spectator import Shot
 
 

@@ -13,7 +13,7 @@ from golem.robots.mujoco.config import MujocoConfig
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.worlds.layout import GANTRY
 from golem.runtime.lockstep import start_posture
-from golem.skills.pack_job import SENTENCE
+from golem.skills.gantry import SENTENCE
 from golem.types import Array
 
 

@@ -8,9 +8,8 @@ from golem.capabilities.legs.base import Envelope, LocomotionCommand
 from golem.capabilities.legs.gait import GaitConfig
 from golem.capabilities.legs.hold import JointHold
 from golem.capabilities.legs.locomotion import Locomotion
-from golem.evaluation.episodes.plain_episode import BARE, PlainEpisode
+from golem.evaluation.episodes.plain_episode import BARE, PlainEpisode, PlainRobot
 from golem.interfaces.payloads import LegCommand
-from golem.robots.mujoco.plain_robot import PlainRobot
 from golem.runtime.lockstep import start_posture
 from golem.types import BaseEstimate, LowState, Twist
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from golem.evaluation.episodes.simulated_odometry import LATENCY, PERIOD, POSITION_NOISE, YAW_NOISE, SimulatedOdometry
+from golem.evaluation.episodes.episode import ODOMETRY_LATENCY, PERIOD, POSITION_NOISE, YAW_NOISE, SimulatedOdometry
 from golem.interfaces import topics
 from golem.middleware.bus import Bus
 from golem.robots.mujoco.engine import MujocoRobot
@@ -32,7 +32,7 @@ def test_simulated_odometry_is_its_source_with_noise_at_its_rate(source: Any) ->
         if bus.count(topics.ODOMETRY) > seen:
             seen = bus.count(topics.ODOMETRY)
             found = bus.latest(topics.ODOMETRY)
-            assert found is not None and t - found.t >= LATENCY - 1e-9
+            assert found is not None and t - found.t >= ODOMETRY_LATENCY - 1e-9
             x, y = found.T_odom_base[:2, 3] - middle
             errors.append((x, y, np.arctan2(found.T_odom_base[1, 0], found.T_odom_base[0, 0])))
     assert seen == pytest.approx(300.0 / PERIOD, abs=2)

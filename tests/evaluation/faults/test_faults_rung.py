@@ -7,9 +7,8 @@ import pytest
 from golem.errors import ConfigError
 from golem.evaluation.base import TrialSpec
 from golem.evaluation.faults.catalogue import FAULTS
-from golem.evaluation.faults.judge import FaultFinding, verdict
 from golem.evaluation.faults.rig import Expect, FaultSource, Injection
-from golem.evaluation.rungs.faults import FaultOptions, FaultsRung
+from golem.evaluation.rungs.faults import FaultFinding, FaultOptions, FaultsRung, verdict
 from golem.interfaces.payloads import GateState, Reason
 
 STOP = Injection("x", FaultSource.COMMAND, Expect.STOP, (Reason.COMMAND_STALE,), 0.1, stands=True)

@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from golem.errors import OutputError
+from golem.errors import ConfigError, OutputError
 from golem.evaluation.base import TrialOutcome, TrialSpec
 from golem.evaluation.harness.records import Provenance, TrialRecord, artefacts, read_records, trial_name
-from golem.evaluation.harness.run_folder import Finished, RunFolder
+from golem.evaluation.harness.run_folder import Finished, RunFolder, finished_records, read_costs, read_facts
 
 FACTS = {"config": {"stack": {"latency": 0.02}, "user_files": {"lower_body/use": 16 * "a"}}}
 PROVENANCE = Provenance({"a": FACTS, "b": {}}, {"stack.py": 16 * "c"}, "commit", {"numpy": "2"})
@@ -69,6 +69,55 @@ def test_a_broken_line_in_the_middle_is_an_error_that_names_it(tmp_path: Path) -
         resume(tmp_path)
 
 
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"index": "3"}, {"index": -1}, {"index": True}, {"success": "yes"}, {"success": True}, {"method": None},
+        {"case": "uphill"}, {"case": {"slope": [1]}}, {"options": None}, {"series": [1.0]}, {"series": {"x": "far"}},
+        {"timings": {"total": float("nan")}}, {"picture": 3}, {"versions": "2"},
+    ],
+    ids=str,
+)  # fmt: skip
+def test_a_value_that_no_trial_has_is_refused_with_its_line(change: dict[str, object], tmp_path: Path) -> None:
+    fill(tmp_path, ("a", 0))
+    trials = tmp_path / "trials.jsonl"
+    trials.write_text(trials.read_text() + json.dumps({**json.loads(trial("b", 0)[0].line()), **change}) + "\n")
+    for read in (read_records, lambda path: finished_records(path.parent)):
+        with pytest.raises(OutputError, match=r"^Line 2 of .*trials.jsonl is a trial record .*; choose another folder"):
+            read(trials)
+
+
+def test_records_of_one_trial_count_once_or_not_at_all(tmp_path: Path) -> None:
+    fill(tmp_path, ("a", 0), ("b", 0))
+    trials = tmp_path / "trials.jsonl"
+    trials.write_text(2 * trials.read_text())
+    with pytest.raises(OutputError, match="Line 3 of .* is the second record of trial 0 of a;"):
+        read_records(trials)
+
+
+def test_a_rung_that_is_no_more_is_named_with_those_that_are(tmp_path: Path) -> None:
+    fill(tmp_path, ("a", 0))
+    trials = tmp_path / "trials.jsonl"
+    trials.write_text(trials.read_text().replace("tether", "tehter"))
+    with pytest.raises(ConfigError, match="Unknown rung of .*trials.jsonl 'tehter'; valid: .* mean 'tether'"):
+        finished_records(tmp_path)
+
+
+@pytest.mark.parametrize("line", ["{", "[]", "null", '{"cpu": 1}', '{"wall": "x", "cpu": 1}', "[" * 5000])
+def test_times_that_are_none_are_named_by_their_line(line: str, tmp_path: Path) -> None:
+    fill(tmp_path, ("a", 0))
+    times = tmp_path / "timings.jsonl"
+    times.write_text(times.read_text() + line + "\n" + times.read_text())
+    with pytest.raises(OutputError, match=r"^Line 2 of .*timings.jsonl says no times of a trial"):
+        read_costs(tmp_path)
+
+
+@pytest.mark.parametrize("text", ["", "{", "[1, 2]", "null", "3"])
+def test_facts_that_are_none_count_as_absent(text: str, tmp_path: Path) -> None:
+    (tmp_path / "run.json").write_text(text)
+    assert read_facts(tmp_path) == {}
+
+
 def other(**config: object) -> dict[str, Any]:
     """Return the provenance of another configuration of method a."""
     return {"provenance": replace(PROVENANCE, facts={"a": {"config": {**FACTS["config"], **config}}})}
@@ -78,7 +127,10 @@ def other(**config: object) -> dict[str, Any]:
     ("what", "options"),
     [
         ("configuration.*config.stack.latency was 0.02 and is 0.04", other(stack={"latency": 0.04})),
-        ("configuration.*config.user_files.lower_body/use has changed", other(user_files={"lower_body/use": 16 * "b"})),
+        (
+            "configuration.*: the content of your file for lower_body/use has changed",
+            other(user_files={"lower_body/use": 16 * "b"}),
+        ),
         ("code.*stack.py has changed", {"provenance": replace(PROVENANCE, files={"stack.py": 16 * "d"})}),
         ("package versions.*numpy was 2 and is 3", {"provenance": replace(PROVENANCE, versions={"numpy": "3"})}),
         ("profile.*profile was field and is ideal", {"profile": "ideal"}),

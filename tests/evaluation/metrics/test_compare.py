@@ -21,8 +21,9 @@ def runs(fake: Callable[..., LadderConfig]) -> tuple[Path, Path]:
     second.mkdir()
 
     def other(r: TrialRecord) -> TrialRecord:
-        turned = replace(r, success=not r.success) if r.index < 3 else r
-        return replace(turned, rung="harder")
+        stage, module = ("grasp", "grasp_method") if r.success else ("done", None)
+        turned = replace(r, success=not r.success, stage=stage, module=module) if r.index < 3 else r
+        return replace(turned, rung="climb")
 
     lines = [other(r).line() for r in read_records(first / "trials.jsonl")]
     (second / "trials.jsonl").write_text("".join(lines))
@@ -37,10 +38,10 @@ def test_trials_are_paired_across_rungs(runs: tuple[Path, Path], capsys: pytest.
     table = PairedTable.count(won, lost)
     assert found.table == table and table.only_a + table.only_b == 3
     assert found.p == pytest.approx(mcnemar(table))
-    assert (found.a, found.b) == ("good on fake", "good on harder")
+    assert (found.a, found.b) == ("good on fake", "good on climb")
     said = capsys.readouterr().out
-    assert "The runs are of two rungs, fake and harder: the same draws in two tasks" in said
-    assert "good on fake against good on harder" in said and f"{sum(won)}/12" in said and f"{sum(lost)}/12" in said
+    assert "The runs are of two rungs, fake and climb: the same draws in two tasks" in said
+    assert "good on fake against good on climb" in said and f"{sum(won)}/12" in said and f"{sum(lost)}/12" in said
 
 
 def test_runs_that_cannot_be_paired_are_refused(runs: tuple[Path, Path], fake: Callable[..., LadderConfig]) -> None:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import time
 from dataclasses import asdict
 from pathlib import Path
 
@@ -48,6 +49,7 @@ def test_the_template_is_a_valid_csv(tmp_path: Path) -> None:
         ("tether,visual_servo,,success,count,30,2.5,,,", "2.5 of 30 successes"),
         ("tether,visual_servo,,success,count,30,-1,,,", "-1 of 30"),
         ("tether,visual_servo,,success,count,,3,,,", "'n' has no default"),
+        ("tether,visual_servo,,success,trial,5,3,,,", "n is a number from 1 to a million, 1 of a trial"),
         ("tether,visual_servo,,success,count,30,,,,", "'value' has no default"),
         ("tether,visual_servo,,success,trial,,0.5,,,", "0.5 of 1"),
         ("tether,visual_servo,,success,mean,30,1,,,", "count or trial"),
@@ -79,7 +81,15 @@ def test_a_line_that_cannot_be_is_refused_in_one_sentence(tmp_path: Path, line: 
         ("", "has no line of trials"),
         (HEAD, "has no line of trials"),
         ("rung,method,stat,value\ntether,visual_servo,count,3\n", "'metric' has no default"),
-        (HEAD.strip() + ",luck\ntether,visual_servo,,success,count,30,3,,,,1\n", "Unknown column"),
+        *(
+            (HEAD.strip() + more + "\ntether,visual_servo,,success,count,30,3,,,,1\n", "it names case, .*, each once")
+            for more in (",luck", ",n", ",")
+        ),
+        *(
+            (HEAD.replace(",", mark) + "tether\n", "^The first line of .* is 'rung.*'; it names .* with commas between")
+            for mark in (";", "\t", " | ")
+        ),
+        (HEAD.upper() + "tether\n", "^The first line of .* is 'RUNG, "),
     ],
 )
 def test_a_file_without_its_columns_is_refused(tmp_path: Path, text: str, words: str) -> None:
@@ -91,6 +101,16 @@ def test_a_file_without_its_columns_is_refused(tmp_path: Path, text: str, words:
     (tmp_path / "real.csv").write_bytes(b"\xff\xfe\x00r")
     with pytest.raises(GolemError, match="cannot be read"):
         read_real(str(tmp_path / "real.csv"))
+
+
+def test_a_csv_as_spreadsheets_write_it_and_a_long_one_are_read_at_once(tmp_path: Path) -> None:
+    row = "tether, visual_servo, , success, trial, , 1, , , x\r\n"
+    path = tmp_path / "real.csv"
+    path.write_text("\ufeff" + HEAD.strip().replace(",", ", ") + "\r\n" + row * 1000 + ",,,,,,,,,\r\n", "utf-8")
+    begun = time.process_time()
+    assert read_real(str(path)) == [RealRow("tether", "visual_servo", "success", "trial", 1.0, 1, source="x")] * 1000
+    assert run_real(RealConfig(str(path))) == 1
+    assert time.process_time() - begun < 30.0  # [own] a rung made for each line takes minutes
 
 
 def test_runs_that_are_none_or_of_two_profiles_are_refused(tmp_path: Path) -> None:

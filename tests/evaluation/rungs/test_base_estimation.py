@@ -16,7 +16,7 @@ from golem.evaluation.rungs import base_estimation as walks
 from golem.evaluation.rungs.base_estimation import BaseEstimation, RecordedWalk, _way, follow, slipping, wrong_contacts
 from golem.hardware.estimator.feet import FeetConfig
 from golem.hardware.estimator.random_walk_kf import base_velocity
-from golem.robots.model.leg_dynamics import LegDynamics
+from golem.robots.model.leg_kernel import LegDynamics
 from golem.robots.model.spatial import rotation_rpy
 from golem.types import LEGS, NUM_JOINTS, Array, Imu, LowState
 

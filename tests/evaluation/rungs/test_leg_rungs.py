@@ -143,13 +143,13 @@ def test_every_ground_is_another_twin_and_an_unknown_one_is_refused() -> None:
 
 @pytest.mark.slow
 @pytest.mark.timeout(600)
-@pytest.mark.parametrize("count", [1, pytest.param(4, marks=pytest.mark.long)])
+@pytest.mark.parametrize("count", [3, pytest.param(6, marks=pytest.mark.long)])
 def test_poses_are_reached_as_precisely_and_as_surely_as_in_199_of_200_trials(count: int) -> None:
     made = make_rung(RUNGS["walk-stop"], {"latency": 0.02})
     trials = [made.run(TrialSpec("walk-stop", "almi", "field", 0, index), None) for index in range(count)]
     arrived = [trial for trial in trials if trial.success]
     errors = [trial.series["goal_radial"] for trial in trials]
-    assert len(arrived) >= min(count, 3), [trial.detail for trial in trials]
+    assert len(arrived) >= 3, [trial.detail for trial in trials]
     assert 0.0 < min(errors) and max(errors) < 2 * 0.054 and sum(errors) / len(errors) < 2 * 0.020
     assert all(4.0 < trial.timings["walk"] <= walking.TIMEOUT for trial in arrived)
 

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from golem.evaluation.base import TrialSpec, make_rung, rung_class
-from golem.evaluation.episodes.contacts import ContactWatch
 from golem.evaluation.episodes.episode import Episode
+from golem.evaluation.episodes.oracle import ContactWatch
 from golem.evaluation.rungs.navigate_hall import HallWalk, NavigateOptions, NavigateRung, judge
 from golem.interfaces import topics
 from golem.interfaces.payloads import Odometry

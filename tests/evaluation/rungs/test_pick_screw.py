@@ -11,9 +11,8 @@ from golem.errors import ConfigError
 from golem.evaluation.base import TrialSpec
 from golem.evaluation.episodes.episode import Loss, episode_seed
 from golem.evaluation.episodes.oracle import GraspTruth, Oracle
-from golem.evaluation.episodes.pick_blame import PAD_REACH, STRAIGHT, blame
 from golem.evaluation.rungs import pick_screw as pick
-from golem.evaluation.rungs.pick_screw import PickOptions, StandRung, TetherRung
+from golem.evaluation.rungs.pick_screw import PAD_REACH, STRAIGHT, PickOptions, StandRung, TetherRung, blame
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.runtime.lockstep import build
 from golem.stack import load_stack

@@ -12,9 +12,9 @@ import pytest
 from golem.capabilities.arms.postures import POSTURES, mirror
 from golem.errors import ConfigError
 from golem.evaluation.base import RUNGS, Outcomes, TrialOutcome, TrialSpec, make_rung
-from golem.evaluation.episodes import league_tour as league
 from golem.evaluation.episodes.episode import Episode, Loss
 from golem.evaluation.rungs import tour
+from golem.evaluation.rungs import tour as league
 from golem.types import PlanarPose, Twist
 
 METHODS = Path(__file__).parents[1] / "leg_methods.py"

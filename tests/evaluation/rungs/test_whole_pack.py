@@ -65,8 +65,9 @@ def test_the_list_errs_by_as_much_as_asked(tmp_path: Path) -> None:
 def test_the_list_of_the_real_pack_has_its_kinds_and_trays(tmp_path: Path) -> None:
     scene: Any = SimpleNamespace(layout=Ioniq5Layout(), draws=())
     write_claims(tmp_path / "a.csv", scene, WholePackOptions(world="ioniq5"), np.random.default_rng(0))
-    kinds = Counter(one.kind for one in read_list(tmp_path / "a.csv", {"tray"}))
-    assert kinds == {"screw": 53, "nut": 30, "bolt": 1, "tray": 8}
+    listed = read_list(tmp_path / "a.csv", {"tray"})
+    assert Counter(one.kind for one in listed) == {"screw": 53, "nut": 30, "bolt": 1, "tray": 13}
+    assert Counter(one.takes for one in listed) == {"": 84, "screw": 7, "nut": 6}
 
 
 def test_the_share_in_the_tray_wrong_words_and_false_claims_are_counted() -> None:

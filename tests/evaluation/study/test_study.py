@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fcntl
+import json
 import os
 from collections.abc import Callable
 from dataclasses import replace
@@ -214,3 +215,25 @@ def test_what_shares_a_scene_counts_as_one(fake: Callable[..., LadderConfig], tm
     assert study.success(cell, "good") == (1.0, wilson(20, 20)) and study.rates().rows[0][1] == "100.0 [83.9, 100] (40)"
     early = replace(study, stop="decided").success(cell, "good")[1]
     assert early == anytime_interval([1.0] * 20)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"cells": ...}, {"cells": [1]}, {"cells": {"a": "many"}}, {"compare": [["a"]]}, {"margin": "wide"},
+        {"comparisons": 0}, {"stop": ...},
+    ],
+    ids=str,
+)  # fmt: skip
+def test_facts_of_a_study_that_are_none_are_refused(change: dict[str, object], tmp_path: Path) -> None:
+    facts = dict.fromkeys(("name", "title", "about", "by_construction", "command", "stop", "score"), "")
+    whole = {**facts, "margin": 0.1, "comparisons": 1, "compare": [], "cells": {"a": 1}}
+    for said, words in ((change, "study.json is no study: .*; run the study again"), ({}, "holds no trials yet")):
+        kept = {name: value for name, value in {**whole, **said}.items() if value is not ...}
+        (tmp_path / "study.json").write_text(json.dumps(kept))
+        with pytest.raises(ConfigError, match=words):
+            read_study(tmp_path)
+    for text in ("[]", "3", "null", "{"):
+        (tmp_path / "study.json").write_text(text)
+        with pytest.raises(ConfigError, match="study.json is no study"):
+            read_study(tmp_path)

@@ -13,7 +13,7 @@ from tests.hardware.estimator.sensed_feet import Feet
 from golem.hardware.estimator.attitude import Attitude
 from golem.hardware.estimator.feet import FeetConfig
 from golem.robots.model.imu_mount import TORSO, base_rate
-from golem.robots.model.leg_dynamics import LegDynamics
+from golem.robots.model.leg_kernel import LegDynamics
 from golem.types import LEGS, NUM_JOINTS, LowState
 
 DT = 0.002

@@ -17,9 +17,8 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from golem.middleware.dds.base import ENCAPSULATION, Qos
 from golem.middleware.ros.codec import dds_name, serialize, service
-from golem.middleware.ros.message import CodecError
+from golem.middleware.ros.message import CodecError, Header, pack, unpack
 from golem.middleware.ros.node import RosNode
-from golem.middleware.ros.request_header import Header, pack, unpack
 
 from .conftest import SET_BOOL, World
 

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from golem.robots.model.leg_dynamics import LegDynamics
+from golem.robots.model.leg_kernel import LegDynamics
 from golem.robots.model.leg_kinematics import leg_poses, sole_centers
 from golem.robots.model.mjcf import robot_spec
 from golem.robots.model.spatial import skew

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from golem.errors import ConfigError
+from golem.evaluation.episodes.plain_episode import PlainRobot, plain_model
 from golem.robots.model.table import load_limits
-from golem.robots.mujoco.plain_robot import PlainRobot, plain_model
 from golem.runtime.lockstep import start_posture
 from golem.types import NUM_JOINTS, LowCommand
 

@@ -14,6 +14,7 @@ from tests.robots.worlds.conftest import Compiled
 from tests.robots.worlds.test_pack import height
 
 from golem.robots.mujoco.config import MujocoConfig
+from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.mujoco.scene import nominal_layout
 from golem.robots.worlds.conditions import Conditions, Fasteners, arranged, draw_conditions, draw_fasteners
 from golem.robots.worlds.ioniq5 import RIM, Ioniq5Layout, ioniq5_data
@@ -21,6 +22,8 @@ from golem.robots.worlds.layout import PackLayout
 from golem.robots.worlds.pack import add_pack
 from golem.robots.worlds.pack_part import without
 from golem.robots.worlds.screws import ScrewRanges, draw_screws
+from golem.runtime import lockstep
+from golem.stack import load_stack
 
 STEP = 0.002
 
@@ -180,7 +183,7 @@ def build_draw(seed: int) -> tuple[Conditions, Fasteners, PackLayout]:
 def test_trays_stand_apart_on_the_cover_beside_the_fasteners(side: str) -> None:
     layout = arranged(Ioniq5Layout(), Conditions(tray_side=side, pack_yaw=0.1))  # pyright: ignore[reportArgumentType]
     trays = layout.trays()
-    assert len(trays) == 8 and Counter(t.kind for t in trays) == {"screw": 4, "nut": 4}
+    assert Counter(t.kind for t in trays) == {"screw": 7, "nut": 6}
     np.testing.assert_allclose(trays[0].pose(), layout.tray_pose(), atol=1e-12)
     T = np.linalg.inv(layout.pose())
     half = 0.5 * np.array(layout.tray_size[:2])
@@ -201,3 +204,20 @@ def test_the_rim_is_as_high_over_the_floor_in_the_hoist_as_standing() -> None:
     assert stands.top_z == RIM
     assert hangs.top_z - RIM == pytest.approx(MujocoConfig().hoist.height - 0.96)
     assert type(nominal_layout(MujocoConfig(), 0.96)) is PackLayout
+
+
+def test_a_nut_that_is_let_go_flat_above_its_tray_stays_in_it() -> None:
+    _, robot = lockstep.build(load_stack("tether", profile="ideal").with_options("robot", world="ioniq5"), 0)
+    assert isinstance(robot, MujocoRobot)
+    model, data, layout = robot.scene.model, robot.data, robot.scene.layout
+    tray = next(tray for tray in layout.trays() if tray.kind == "nut")
+    nuts = [draw for draw in robot.scene.draws if layout.kind(draw.slot) == "nut"]
+    for k, draw in enumerate(nuts[:12]):
+        joint = model.body(draw.name).jntadr[0]
+        at = model.jnt_qposadr[joint]
+        data.qpos[at : at + 7] = (tray.x, tray.y + 0.015 * (k - 6), tray.z + 0.1 + 0.0005 * k, 1.0, 0.0, 0.0, 0.0)
+    for _ in range(300):
+        mujoco.mj_step(model, data)
+    heights = [float(data.body(draw.name).xpos[2]) for draw in nuts[:12]]
+    robot.close()
+    assert min(heights) > tray.z

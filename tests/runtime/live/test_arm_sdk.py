@@ -16,7 +16,7 @@ from golem.middleware.dds.base import Qos
 from golem.middleware.ros.msgs.unitree_go import WirelessController
 from golem.middleware.wire import hg
 from golem.middleware.wire.struct_layout import WireError
-from golem.runtime.live.arm_sdk import ArmSdk
+from golem.runtime.live.stack_streams import ArmSdk
 from golem.types import ARMS, LEGS, NUM_JOINTS, TICK, Array, LowCommand
 
 OWN = LowCommand(0.0, *(np.full(NUM_JOINTS, v) for v in (0.5, 0.0, 1.0, 100.0, 2.0)))

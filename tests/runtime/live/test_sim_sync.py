@@ -99,5 +99,16 @@ def test_only_a_patient_gate_that_is_active_says_what_its_commands_answer(live: 
 def test_the_gate_is_more_patient_than_the_robot_and_otherwise_as_strict() -> None:
     strict = SafetyLimits.from_profile()
     lenient = relaxed_limits(strict)
-    assert lenient.state_age == lenient.command_age == SILENCE > PATIENCE
+    assert lenient.state_age > SILENCE > PATIENCE
     assert lenient.estop_age == strict.estop_age and lenient.velocity is strict.velocity
+
+
+def test_of_a_robot_that_is_gone_the_state_is_missed_and_not_the_command_that_answers_an_older_one(live: Live) -> None:
+    live.leave("safety")
+    live.start_gate(patient=True)
+    live.activate()
+    live.leave("up")
+    live.run(LAG)
+    live.leave("twin")
+    live.run(SILENCE + 1.0, lambda: live.state is not GateState.ACTIVE)
+    assert live.reason.startswith("state_stale")

@@ -10,8 +10,7 @@ import pytest
 from golem.capabilities.grasping.centroid import grasp_pose
 from golem.robots.worlds.tableware import KINDS
 from golem.training.grasps import grasp_labels
-from golem.training.grasps.grasp_labels import GraspTrial
-from golem.training.grasps.ware_scene import WARE, WRIST, WareDraw, build_world
+from golem.training.grasps.grasp_labels import WARE, WRIST, GraspTrial, WareDraw, build_world
 
 DOWN = np.array([0.0, 0.0, -1.0])
 

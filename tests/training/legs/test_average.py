@@ -14,7 +14,7 @@ onnx = pytest.importorskip("onnx", reason="export needs the extra 'train'")
 from onnx import numpy_helper
 
 from golem.errors import ConfigError
-from golem.training.legs.average import average
+from golem.training.legs.export_policy import average
 
 ROOT = Path(__file__).parents[3]
 SHIPPED = ROOT / "src/golem/capabilities/legs/policies"

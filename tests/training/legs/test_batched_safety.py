@@ -13,7 +13,7 @@ pytest.importorskip("torch", reason="training needs the extra 'train'")
 from golem.hardware.safety.base import Counters, Outgoing, SafetyLimits
 from golem.hardware.safety.limiter import limit_command
 from golem.hardware.safety.monitor import examine
-from golem.training.legs.batched_safety import LegGate
+from golem.training.legs.batch_world import LegGate
 from golem.training.legs.training_model import KD, KP, STANCE, STEP
 from golem.types import LEGS, NUM_JOINTS, Imu, LowCommand, LowState
 

@@ -24,12 +24,10 @@ class DiffIK(TaskSpaceController):
     """Weighted-task differential IK for torso and both arms, assembled by hand: the default."""
 
     def __init__(self, config: TaskSpaceConfig | None = None) -> None:
-        """Build the model; see `TaskSpaceController`."""
         super().__init__(config)
         self._kinds = np.zeros(len(self.task.below), np.int32)
 
     def solve(self, dt: float) -> Array | None:
-        """Solve the program that stands in `task`; see `TaskSpaceController.solve`."""
         task, rows = self.task, int(self.task.state[COUNT])
         n = NUM_UPPER + rows
         step, _, flag, _ = daqp.solve(

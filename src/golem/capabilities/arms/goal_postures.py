@@ -34,11 +34,7 @@ ALIKE = 0.05
 
 
 class GoalPostures:
-    """Finds postures within the range that the safety gate allows.
-
-    Attributes:
-        nearest: how near the last search came to its targets, of the farther hand [m].
-    """
+    """Finds postures in the gate's range; `nearest` is how near the last search brought the farther hand [m]."""
 
     def __init__(self) -> None:
         self._ik, self._around = DiffIK(_OFFLINE), DiffIK(_AROUND)

@@ -31,21 +31,14 @@ class HandForce:
         self._arm = UpperKinematics()
 
     def __call__(self, side: Side, q: Array, tau: Array) -> Array:
-        """Return the (3,) force that a hand exerts on what it touches, in base_link [N].
-
-        Args:
-            q: (15,) joints of torso, left arm, right arm [rad].
-            tau: (15,) their torques [N m].
-        """
-        wrench = self.wrench(side, q, tau)
-        return np.asarray(self._arm.placement(side).rotation @ wrench[:3], dtype=np.float64)
+        """Return the (3,) force of a hand on its surroundings, in base_link [N], by (15,) `q` [rad] and `tau` [N m]."""
+        return np.asarray(self._arm.placement(side).rotation @ self.wrench(side, q, tau)[:3], dtype=np.float64)
 
     def covariance(self, side: Side, q: Array) -> Array:
         """Return the (6, 6) covariance of `wrench`, in its frame, by the two standard deviations above."""
         self._arm.update(q)
         J = self._arm.jacobian(side)[:, ARM_COLUMNS[side]]
-        information = J @ J.T + np.diag((TORQUE / WRENCH) ** 2)
-        return np.asarray(TORQUE**2 * np.linalg.inv(information), dtype=np.float64)
+        return np.asarray(TORQUE**2 * np.linalg.inv(J @ J.T + np.diag((TORQUE / WRENCH) ** 2)), dtype=np.float64)
 
     def wrench(self, side: Side, q: Array, tau: Array) -> Array:
         """Return the (6,) force [N] and moment [N m] of a hand on what it touches, in its grasp frame."""
@@ -57,8 +50,7 @@ class HandForce:
 
 def _likely(J: Array, rest: Array) -> Array:
     """Return the most likely (6,) wrench behind `rest` (7,), what an arm's motors do beyond its dynamics."""
-    likely = J @ J.T + np.diag((TORQUE / WRENCH) ** 2)
-    return np.asarray(np.linalg.solve(likely, J @ rest), dtype=np.float64)
+    return np.asarray(np.linalg.solve(J @ J.T + np.diag((TORQUE / WRENCH) ** 2), J @ rest), dtype=np.float64)
 
 
 MOMENTUM, QUICK, SLOW = 0.012, 0.006, 0.6
@@ -84,7 +76,6 @@ class ContactSense:
     not overcome hides it: a joint that sticks tells its motor nothing.
 
     Attributes:
-        touching: whether something does.
         change: (6,) the wrench of the hand on the world since before the touch, in its grasp frame [N, N m].
     """
 
@@ -123,8 +114,7 @@ class ContactSense:
         moving = MOTION * np.abs(self._smooth[3:10]).max() + TURN * np.linalg.norm(self._smooth[:3])
         self._margin = max(float(moving), self._margin * (1.0 - min(1.0, dt / FADE)))
         self.touching = force > (LEFT if touched else TOUCH) + self._margin
-        constant = HELD if self.touching else SLOW
-        self._slow = self._slow + min(1.0, dt / constant) * (self._quick - self._slow)
+        self._slow = self._slow + min(1.0, dt / (HELD if self.touching else SLOW)) * (self._quick - self._slow)
         return self.touching != touched
 
     def _wrench(self, q: Array, smooth: Array, rate: Array) -> Array:

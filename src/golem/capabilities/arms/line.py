@@ -123,11 +123,7 @@ class LineCheck:
 
 
 class LineChecker:
-    """Tries lines on an arm of its own.
-
-    Attributes:
-        ik: that arm.
-    """
+    """Tries lines on an arm of its own."""
 
     def __init__(self) -> None:
         self.ik = DiffIK()

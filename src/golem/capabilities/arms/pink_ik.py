@@ -10,7 +10,7 @@ import pinocchio as pin
 from golem.capabilities.arms.base import GRIPPER_FRAME
 from golem.capabilities.arms.task_kernel import LAMBDA
 from golem.capabilities.arms.task_space import TaskSpaceConfig, TaskSpaceController
-from golem.errors import MissingExtra
+from golem.errors import needs
 from golem.types import SIDES, Array
 
 # Pink ignores velocity limits below 1e-10, so "does not move" is this [rad/s]; the caller clips the rest.
@@ -24,18 +24,11 @@ class PinkIK(TaskSpaceController):
     """
 
     def __init__(self, config: TaskSpaceConfig | None = None) -> None:
-        """Build the model and Pink's tasks.
-
-        Raises:
-            ConfigError: see `TaskSpaceController`.
-            MissingExtra: Pink, or the solver it is used with, is not installed.
-        """
-        try:
+        """Build the model. Raises ConfigError: see `TaskSpaceController`; MissingExtra: no Pink, or no solver."""
+        with needs("pin-pink", "pink"):
             import pink
             import pink.limits
             import pink.tasks
-        except ImportError as error:
-            raise MissingExtra("pin-pink", "pink") from error
         super().__init__(replace(config or TaskSpaceConfig(), collision_rows=0))
         c = self.config
         self._pink = pink
@@ -56,7 +49,6 @@ class PinkIK(TaskSpaceController):
         self._range = pink.limits.ConfigurationLimit(model, config_limit_gain=1.0)
 
     def solve(self, dt: float) -> Array | None:
-        """Set Pink's targets and let it solve; see `TaskSpaceController.solve`."""
         k, task = self.kinematics, self.task
         configuration = self._pink.Configuration(k.model, k.data, self.q, copy_data=False, forward_kinematics=False)
         moving = (task.above > task.below)[: len(self.q)]

@@ -38,22 +38,14 @@ a shelf, hands at (0.45, -+0.22, 0.15) that look straight ahead."""
 
 
 def posture(name: str) -> Array:
-    """Return a copy of the (15,) joints of a named posture [rad].
-
-    Raises:
-        ConfigError: there is no such posture.
-    """
+    """Return a copy of the (15,) joints of a named posture [rad]. Raises ConfigError: there is no such posture."""
     if name not in POSTURES:
         raise unknown_name("posture", name, POSTURES)
     return POSTURES[name].copy()
 
 
 def mirror(q: Array) -> Array:
-    """Return the posture seen in the x-z plane: left and right exchanged, rolls and yaws negated.
-
-    Args:
-        q: (15,) upper-body joints [rad].
-    """
+    """Return `q` (15,) [rad] seen in the x-z plane: left and right exchanged, rolls and yaws negated."""
     out = np.empty(NUM_UPPER)
     out[0] = -q[0]
     out[ARM_COLUMNS["left"]] = _MIRROR * q[ARM_COLUMNS["right"]]

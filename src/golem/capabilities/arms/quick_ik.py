@@ -17,11 +17,7 @@ TURNS = (0.0, 0.25, -0.25)
 
 
 class QuickIK:
-    """Damped least squares (Wampler 1986) on the seven joints of an arm, the torso still, from several starts.
-
-    Attributes:
-        kinematics: the model it works on.
-    """
+    """Damped least squares (Wampler 1986) on the seven joints of an arm, the torso still, from several starts."""
 
     def __init__(self) -> None:
         self.kinematics = UpperKinematics()

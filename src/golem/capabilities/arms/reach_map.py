@@ -70,11 +70,7 @@ class ReachMap:
 
 
 def save_map(reach: ReachMap, file: Path) -> None:
-    """Write the JSON file: margins in mrad, shifts in mm, -1 where a point is not served.
-
-    Raises:
-        OutputError: the file cannot be written.
-    """
+    """Write the JSON file: mrad and mm, -1 where a point is not served. Raises OutputError: it cannot be written."""
     margin = np.where(reach.served(), np.floor(1e3 * reach.margin), -1).astype(int)
     shift = np.where(reach.served(), np.rint(1e3 * reach.com_shift), -1).astype(int)
     data = {
@@ -91,11 +87,7 @@ def save_map(reach: ReachMap, file: Path) -> None:
 
 @functools.cache
 def load_map(file: Path = H12_REACH) -> ReachMap:
-    """Read a file of `save_map`.
-
-    Raises:
-        ConfigError: it cannot be read, or is no such file.
-    """
+    """Read a file of `save_map`. Raises ConfigError: it cannot be read, or is no such file."""
     try:
         data = json.loads(file.read_text(encoding="utf-8"))
         if data["format"] != FORMAT:

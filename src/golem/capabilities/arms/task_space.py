@@ -120,7 +120,6 @@ class TaskSpaceController(ABC):
     """Integrates the joint steps that a subclass solves for; see `UpperBody` for the contract.
 
     Attributes:
-        rate, latency: see `UpperBody`.
         task: its memory, which a subclass reads; see `task_kernel.IkMemory`.
         lower, upper: (15,) position limits it keeps, margin and torso range included [rad]; a waist that starts outside
             that range comes back to it; so does an arm once it has a target.
@@ -130,11 +129,7 @@ class TaskSpaceController(ABC):
     """
 
     def __init__(self, config: TaskSpaceConfig | None = None) -> None:
-        """Build the model.
-
-        Raises:
-            ConfigError: the posture is unknown.
-        """
+        """Build the model. Raises ConfigError: the posture is unknown."""
         self.config = c = config or TaskSpaceConfig()
         self.rate, self.latency = c.rate, c.latency
         self._kinematics = k = UpperKinematics()
@@ -197,7 +192,6 @@ class TaskSpaceController(ABC):
         )
 
     def reset(self, q: Array) -> None:
-        """Start from the joints `q` (27,) [rad]; see `UpperBody.reset`."""
         self._ticks = 0
         self.task.state[[task_kernel.LEFT_OVER, task_kernel.SINGULAR]] = 0.0
         # Not into the range of the waist: a robot that was turned further while it was limp would swing back at once.
@@ -210,7 +204,6 @@ class TaskSpaceController(ABC):
         )
 
     def step(self, targets_left: Array | None, targets_right: Array | None, q_measured: Array, dt: float) -> ArmCommand:
-        """Solve once and integrate; see `UpperBody.step`."""
         task = self.task
         check_joints("q_measured", q_measured)
         check_dt(dt)

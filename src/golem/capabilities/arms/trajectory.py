@@ -11,11 +11,33 @@ import functools
 import numpy as np
 
 from golem.capabilities.arms.base import NUM_UPPER, TargetError, check_dt
-from golem.capabilities.planning.hermite import interpolate
 from golem.hardware.safety.base import SafetyLimits
 from golem.interfaces.payloads import ArmCommand, JointTrajectory
 from golem.robots.model.table import JOINT_NAMES
 from golem.types import UPPER, Array
+
+
+def interpolate(times: Array, points: Array, velocities: Array | None, s: Array) -> Array:
+    """Return (m, n) the joints of a trajectory at `s` (m,) [s]: cubic Hermite, or straight without velocities.
+
+    Args:
+        times: (k,) of its points, increasing.
+        points: (k, n).
+        velocities: (k, n), or None.
+        s: when; before the first point it is that point, and after the last one that one.
+    """
+    if len(times) == 1:
+        return np.repeat(points, len(s), axis=0)
+    s = np.clip(s, times[0], times[-1])
+    i = np.clip(np.searchsorted(times, s, side="right") - 1, 0, len(times) - 2)
+    span = (times[i + 1] - times[i])[:, None]
+    u = (s - times[i])[:, None] / span
+    a, b = points[i], points[i + 1]
+    if velocities is None:
+        return a + u * (b - a)
+    va, vb = span * velocities[i], span * velocities[i + 1]
+    return a + u * va + u**2 * (3.0 * (b - a) - 2.0 * va - vb) + u**3 * (2.0 * (a - b) + va + vb)
+
 
 FASTEST = 0.9
 """Share of the gate's slew rate, which clips what is faster, that is used."""
@@ -24,11 +46,7 @@ NEAR = 0.1
 
 
 class TrajectoryFollower:
-    """Turns a joint trajectory into joint targets tick by tick, within the position and velocity limits.
-
-    Attributes:
-        q: (15,) the command state [rad].
-    """
+    """Turns a joint trajectory into targets `q` (15,) [rad] tick by tick, within limits of position and velocity."""
 
     def __init__(self) -> None:
         self._lower, self._upper, self._speed = gate_limits()
@@ -64,8 +82,7 @@ class TrajectoryFollower:
         # A joint that starts beyond its range comes back at its speed.
         inside = np.clip(wanted, self._lower, self._upper)
         self.q = np.clip(inside, self.q - room, self.q + room)
-        limited = bool(np.abs(self.q - wanted).max() > 1e-9)
-        return ArmCommand(self.q.copy(), np.zeros(2), np.zeros(2), limited)
+        return ArmCommand(self.q.copy(), np.zeros(2), np.zeros(2), bool(np.abs(self.q - wanted).max() > 1e-9))
 
     def _at(self, s: float) -> Array:
         """Return the joints (15,) of the trajectory `s` [s] after its beginning."""

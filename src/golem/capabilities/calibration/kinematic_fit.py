@@ -59,14 +59,7 @@ class TagView:
 
 
 def fit(views: Sequence[TagView], info: CameraInfo) -> Calibration:
-    """Return the calibration that explains the views best.
-
-    Args:
-        views: of both hands.
-
-    Raises:
-        ConfigError: too few views of a hand.
-    """
+    """Return the calibration that explains views of both hands best. Raises ConfigError: too few of a hand."""
     for side in SIDES:
         n = sum(view.side == side for view in views)
         if n < VIEWS:
@@ -103,11 +96,7 @@ def information(side: Side, q: Array, tags: Sequence[int]) -> Array:
 
 
 class ViewProblem(ABC):
-    """Unknowns that explain views, each with a prior about zero.
-
-    Attributes:
-        scale: standard deviation of each unknown's prior.
-    """
+    """Unknowns that explain views, each with a prior about zero, whose standard deviations are `scale`."""
 
     scale: Array
 
@@ -164,8 +153,7 @@ def solve(problem: ViewProblem) -> tuple[Array, Array, float]:
     # A tag that is partly hidden has corners where it has none.
     problem.keep(rough.x)
     found = least_squares(problem.residuals, rough.x, x_scale=problem.scale)
-    residual = float(np.sqrt(np.mean(problem.pixels(found.x) ** 2)))
-    return found.x, np.linalg.inv(found.jac.T @ found.jac), residual
+    return found.x, np.linalg.inv(found.jac.T @ found.jac), float(np.sqrt(np.mean(problem.pixels(found.x) ** 2)))
 
 
 class _Problem(ViewProblem):

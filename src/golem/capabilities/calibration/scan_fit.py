@@ -115,16 +115,11 @@ def fit_lidar(views: Sequence[SurfaceView], info: CameraInfo, head: Array, head_
                 f"What was seen fixes the {what} of the LiDAR only to {sigma:.3f} {unit}; {most:g} is asked for: let "
                 "the robot be where it sees the floor and upright surfaces that face different ways."
             )
-    covariance = own + _of_the_camera(T_optical_lidar, head_covariance)
-    return LidarFit(LidarMount(pose(x), covariance), residual, count)
+    return LidarFit(LidarMount(pose(x), own + _of_the_camera(T_optical_lidar, head_covariance)), residual, count)
 
 
 def planes_of(depth: Sequence[NDArray[np.float32]], info: CameraInfo) -> Array:
-    """Return the plane through the surroundings of each pixel, (h, w, 3): N with N . p = 1 [1/m], or 0.
-
-    Args:
-        depth: (h, w) of each image [m]; see `SurfaceView`.
-    """
+    """Return the planes around the pixels of `depth` (h, w) [m], (h, w, 3): N with N . p = 1 [1/m], or 0."""
     stack = np.stack(depth).astype(np.float64)
     valid = stack > 0.0
     seen = valid.sum(axis=0)

@@ -26,13 +26,8 @@ class TagDetector:
         self._detector = cv2.aruco.ArucoDetector(family, options)
 
     def find(self, rgb: NDArray[np.uint8]) -> dict[int, Array]:
-        """Return the (4, 2) corners of each tag [px], by its number; see `tag_corners` for their order.
-
-        Args:
-            rgb: (height, width, 3) image.
-        """
-        grey = cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY)
-        corners, numbers, _ = self._detector.detectMarkers(grey)
+        """Return the (4, 2) corners of each tag in `rgb` [px], in the order of `tag_corners`, by its number."""
+        corners, numbers, _ = self._detector.detectMarkers(cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY))
         if numbers is None:
             return {}
         found: dict[int, Array] = {}

@@ -49,8 +49,7 @@ def view_postures(
         seed: of the draws.
     """
     rng = np.random.default_rng(seed)
-    kinematics = Kinematics()
-    T_base_torso = kinematics.pose("torso_link")
+    T_base_torso = Kinematics().pose("torso_link")
     eye = (T_base_torso @ T_TORSO_HEAD_OPTICAL)[:3, 3]
     ready = posture(f"ready_{side}")
     found: list[tuple[Array, list[int]]] = []

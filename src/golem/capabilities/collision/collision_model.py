@@ -203,8 +203,7 @@ class CollisionModel:
 
 def _frame_along(axis: Array) -> Array:
     """Return a rotation (3, 3) whose z axis is `axis`."""
-    other = np.eye(3)[int(np.abs(axis).argmin())]
-    x = np.cross(other, axis)
+    x = np.cross(np.eye(3)[int(np.abs(axis).argmin())], axis)
     x /= np.linalg.norm(x)
     return np.column_stack([x, np.cross(axis, x), axis])
 
@@ -228,6 +227,5 @@ def _clusters(link: NDArray[np.int64], centres: Array, radii: Array) -> NDArray[
 def _ball(spheres: Array) -> Array:
     """Return a ball (4,) around spheres (n, 4): the middle of their box, and what reaches farthest."""
     low = (spheres[:, :3] - spheres[:, 3:]).min(axis=0)
-    high = (spheres[:, :3] + spheres[:, 3:]).max(axis=0)
-    centre = 0.5 * (low + high)
+    centre = 0.5 * (low + (spheres[:, :3] + spheres[:, 3:]).max(axis=0))
     return np.append(centre, (np.linalg.norm(spheres[:, :3] - centre, axis=1) + spheres[:, 3]).max())

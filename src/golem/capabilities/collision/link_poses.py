@@ -23,12 +23,7 @@ class MeshOracle:
     """Tests pairs of links with their meshes."""
 
     def __init__(self, links: Sequence[LinkGeometry], pairs: NDArray[np.int64]) -> None:
-        """Build a tree per link.
-
-        Args:
-            links: with surfaces.
-            pairs: (n, 2) indices of the links to test.
-        """
+        """Build a tree per link, those with surfaces; `pairs` (n, 2) are indices of the links to test."""
         self.links, self.pairs = tuple(links), pairs.reshape(-1, 2)
         self._trees = [link_tree(link) if link.parts else None for link in links]
         self._balls = [_ball(link) for link in links]
@@ -99,12 +94,7 @@ def joint_value(link: LinkGeometry, q: Mapping[str, float]) -> float:
 
 
 def link_poses(links: Sequence[LinkGeometry], q: Array) -> Array:
-    """Return the (n, 4, 4) poses of the links in the base.
-
-    Args:
-        links: parents before children.
-        q: one position per joint of `joint_names` [rad or m].
-    """
+    """Return the (n, 4, 4) poses of `links`, parents first, in the base; `q` as in `joint_names` [rad or m]."""
     poses = np.empty((len(links), 4, 4))
     values = dict(zip(joint_names(links), (float(v) for v in q), strict=True))
     for i, link in enumerate(links):
@@ -114,11 +104,7 @@ def link_poses(links: Sequence[LinkGeometry], q: Array) -> Array:
 
 
 def hold_joints(links: Sequence[LinkGeometry], held: Mapping[str, float]) -> tuple[LinkGeometry, ...]:
-    """Return the links with some joints, and those that follow them, fixed at a position [rad or m].
-
-    Raises:
-        ConfigError: no link hangs on a joint of that name.
-    """
+    """Return the links with some joints, and their followers, fixed [rad or m]. Raises ConfigError: there is none."""
     names = joint_names(links)
     for name in held:
         if name not in names:

@@ -68,7 +68,6 @@ class Obstacle:
         kind: one of `OBSTACLE_KINDS`.
         T_base_obstacle: (4, 4) pose of its frame.
         size: half extents of a box; radius and half height of a cylinder; radius of a sphere; nothing [m].
-        name: for messages.
     """
 
     kind: ObstacleKind
@@ -134,8 +133,7 @@ def cloud_grid(points: Points, cell: float = 0.02, spheres: Array = NOTHING, mar
     if not points.flags.c_contiguous:
         points = points.copy()
     cells = np.full(tuple(shape), -1, np.int32)
-    count = world_kernel.number_cells(points, frame, cells)
-    balls = np.zeros((count, 4))
+    balls = np.zeros((world_kernel.number_cells(points, frame, cells), 4))
     kept = world_kernel.fill_balls(points, frame, cells, balls)
     balls, cells = _away(balls, cells, spheres, margin)
     return CloudGrid(balls, cells, cell_steps(cells), frame, len(points) - kept)
@@ -172,11 +170,7 @@ def cell_steps(cells: Cells) -> Cells:
 
 
 class World:
-    """What stands around the robot: shapes, and at most one cloud.
-
-    Attributes:
-        cloud: the cloud, if there is one.
-    """
+    """What stands around the robot: shapes, and at most one cloud."""
 
     def __init__(self, obstacles: Sequence[Obstacle] = (), cloud: CloudGrid | None = None) -> None:
         self.obstacles, self.cloud = tuple(obstacles), cloud

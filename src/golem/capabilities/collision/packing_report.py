@@ -21,8 +21,6 @@ class LinkCoverage:
     """How spheres cover one link.
 
     Attributes:
-        link: its name.
-        spheres: how many.
         covered: share of the outer surface that lies in a sphere, by samples that the packer has not seen.
         gap: of the sample farthest outside every sphere [m]; 0 where all are covered.
         stands_out: mean height of the spheres' own outside above the link [m].

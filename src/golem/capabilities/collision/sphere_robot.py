@@ -25,10 +25,7 @@ class SphereRobot:
     """Spheres of a robot.
 
     Attributes:
-        name: of the robot.
-        kind: of the spheres.
         links: the tree, without surfaces, parents before children.
-        packings: the spheres of each link.
         pairs: (n, 2) indices of the links that are tested against each other.
         allowed: (n,) depth to which spheres of each pair may overlap [m]: they stand out where the links do not touch.
         ignored: (k, 2) indices of spheres, counted over all links, that are not: they overlap where links do not.
@@ -49,11 +46,7 @@ class SphereRobot:
 
 
 def save_spheres(robot: SphereRobot, file: Path) -> None:
-    """Write the JSON file; lengths are in metres, rounded to 0.01 mm, and radii are rounded up.
-
-    Raises:
-        ConfigError: the file cannot be written.
-    """
+    """Write the JSON file in metres, to 0.01 mm, radii rounded up. Raises ConfigError: it cannot be written."""
     rows = []
     for link, packing in zip(robot.links, robot.packings, strict=True):
         spheres = np.column_stack([packing.centres.round(5), np.ceil(packing.radii * 1e5 + 1.0) / 1e5])
@@ -81,11 +74,7 @@ def save_spheres(robot: SphereRobot, file: Path) -> None:
 
 
 def load_spheres(file: Path = H12_SPHERES) -> SphereRobot:
-    """Read a file of `save_spheres`.
-
-    Raises:
-        ConfigError: it cannot be read, or is no such file.
-    """
+    """Read a file of `save_spheres`. Raises ConfigError: it cannot be read, or is no such file."""
     try:
         data = json.loads(file.read_text(encoding="utf-8"))
         if data["format"] != FORMAT or data["kind"] not in SPHERE_KINDS:
@@ -147,8 +136,7 @@ def holding(robot: SphereRobot, hand: str, held: Packing, name: str = "held") ->
     if name in names:
         raise ConfigError(f"'{name}' is a link of the robot already; give what it holds another name.")
     at, new = names.index(hand), len(names)
-    zero = np.zeros(3)
-    link = LinkGeometry(name, at, np.eye(4), "", "fixed", np.array([0.0, 0.0, 1.0]), zero, 0.0, 0.0, ())
+    link = LinkGeometry(name, at, np.eye(4), "", "fixed", np.array([0.0, 0.0, 1.0]), np.zeros(3), 0.0, 0.0, ())
     partners = [int(b if a == at else a) for a, b in robot.pairs if at in (a, b)]
     return replace(
         robot,

@@ -64,15 +64,7 @@ class LinkSurface:
 
 
 def link_surface(name: str, parts: Sequence[SurfacePart], seed: int = 0) -> LinkSurface:
-    """Return the outer surface of overlapping parts.
-
-    Args:
-        name: of the link, for messages.
-        parts: at least one mesh with an area.
-
-    Raises:
-        ConfigError: a mesh is not finite.
-    """
+    """Return the outer surface of overlapping meshes, at least one with an area. Raises ConfigError: not finite."""
     import trimesh  # 27 MB, for packing only
 
     if not all(np.isfinite(p.vertices).all() for p in parts):
@@ -95,8 +87,7 @@ def link_surface(name: str, parts: Sequence[SurfacePart], seed: int = 0) -> Link
     outer = dense[_grown(outside)[cell]]
     tree = KDTree(spread(outer, step))
     core = ~outside & ~shell
-    cells = np.argwhere(core)
-    inside = origin + (cells[np.argsort(_slope(core)[core], kind="stable")] + 0.5) * step
+    inside = origin + (np.argwhere(core)[np.argsort(_slope(core)[core], kind="stable")] + 0.5) * step
     # Half of a voxel that the surface passes through is inside; so is its centre, in half of them.
     volume = float(core.sum() + 0.5 * (shell & _grown(outside)).sum()) * step**3
     return LinkSurface(outer, step, inside, volume, tree, origin, core)
@@ -116,8 +107,7 @@ def _grown(mask: Mask) -> Mask:
 def _slope(core: Mask) -> Array:
     """Return how much deeper the deepest neighbour of each voxel is [voxels]; little on the medial axis."""
     depth = np.asarray(ndimage.distance_transform_edt(core))
-    deepest = ndimage.maximum_filter(depth, footprint=ndimage.generate_binary_structure(3, 1))
-    return np.asarray(deepest - depth)
+    return np.asarray(ndimage.maximum_filter(depth, footprint=ndimage.generate_binary_structure(3, 1)) - depth)
 
 
 def _count(mesh: trimesh.Trimesh, step: float) -> int:

@@ -134,8 +134,7 @@ class Antipodal(OpenLoop):
         T, turned, index, worth = self._hands(middles, axes, widths, room, gripper, rims)
         if not len(T):
             return []
-        rim = index >= len(middles) - rims
-        T, gaps, held = self._fit(T, widths[index], thinned(cloud, BETWEEN, c.seed), rim)
+        T, gaps, held = self._fit(T, widths[index], thinned(cloud, BETWEEN, c.seed), index >= len(middles) - rims)
         # What hangs beside the closing axis turns about it, and friction alone is against that; along it, pads are.
         off = np.einsum("nij,ni->nj", T[:, :3, :2], T[:, :3, 3] - cloud.mean(axis=0))
         size = float(np.linalg.norm(cloud.std(axis=0))) + 1e-6
@@ -147,8 +146,7 @@ class Antipodal(OpenLoop):
         # A hand that is as wide as it gets, and a few millimetres off, comes down on what it is to hold.
         score *= np.clip((gripper.max_gap - gaps) / SPARE, TIGHT, 1.0)
         good = np.flatnonzero((gaps <= gripper.max_gap) & (held > 0))
-        order = good[np.argsort(-score[good], kind="stable")]
-        kept = self._distinct(T, gaps, order, self._around(cloud, scene))
+        kept = self._distinct(T, gaps, good[np.argsort(-score[good], kind="stable")], self._around(cloud, scene))
         return [Grasp(T[k].copy(), float(gaps[k]), float(score[k])) for k in kept]
 
     def _pairs(self, cloud: Array, gripper: Gripper) -> tuple[Array, Array, Array, Array, int]:
@@ -182,8 +180,7 @@ class Antipodal(OpenLoop):
             np.concatenate(pair) for pair in zip((middle, way, width, quality), outline, strict=True)
         )
         # Grasps near the middle of the object hold its weight best, and are seen on both sides.
-        size = float(np.linalg.norm(cloud.std(axis=0))) + 1e-6
-        off = np.linalg.norm(middle - cloud.mean(axis=0), axis=1) / size
+        off = np.linalg.norm(middle - cloud.mean(axis=0), axis=1) / (float(np.linalg.norm(cloud.std(axis=0))) + 1e-6)
         order = np.argsort(-quality * np.exp(-(off**2)), kind="stable")
         # Half of them of the outline: of a bottle from above the cloud's own pairs lie on neck and shoulder.
         own, outer = order[order < len(held)], order[order >= len(held)]
@@ -205,8 +202,7 @@ class Antipodal(OpenLoop):
         spots, normals = outline(cloud @ np.column_stack([u, v]))
         if len(spots) < 4:
             return np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0)
-        rng = np.random.default_rng(c.seed)
-        a, b = rng.integers(0, len(spots), (2, c.pairs // 4))
+        a, b = np.random.default_rng(c.seed).integers(0, len(spots), (2, c.pairs // 4))
         way = spots[b] - spots[a]
         width = np.linalg.norm(way, axis=1)
         fits = (width > 0.003) & (width < gripper.max_gap - 2.0 * c.room)
@@ -219,8 +215,7 @@ class Antipodal(OpenLoop):
         behind = np.minimum(0.5 * width[held], ROUND) if gripper.approach[2] > -ACROSS else np.zeros(len(held))
         middle = flat[:, :1] * u + flat[:, 1:] * v + (depth + behind)[:, None] * gripper.approach
         axes = way[held, :1] * u + way[held, 1:] * v
-        quality = (cosine[held] - cone) / (1.0 - cone) * 0.4 + 0.5
-        return middle, axes, width[held], quality
+        return middle, axes, width[held], (cosine[held] - cone) / (1.0 - cone) * 0.4 + 0.5
 
     def _hands(
         self, middles: Array, axes: Array, widths: Array, room: Array, gripper: Gripper, rims: int
@@ -252,8 +247,7 @@ class Antipodal(OpenLoop):
             T = np.tile(np.eye(4), (len(kept), 1, 1))
             T[:, :3, 1], T[:, :3, 2] = axes[kept], z_turned[kept]
             T[:, :3, 0] = np.cross(axes[kept], z_turned[kept])
-            deep = np.clip(room[kept], c.depth, c.depth + extra)
-            T[:, :3, 3] = middles[kept] + deep[:, None] * z_turned[kept]
+            T[:, :3, 3] = middles[kept] + np.clip(room[kept], c.depth, c.depth + extra)[:, None] * z_turned[kept]
             rows.append(T)
             leans.append(lean[kept])
             pairs.append(kept)
@@ -277,8 +271,7 @@ class Antipodal(OpenLoop):
         low, high = _extent(local[..., 1], between)
         T = T.copy()
         T[:, :3, 3] += off[:, None] * T[:, :3, 0] + 0.5 * (low + high)[:, None] * T[:, :3, 1]
-        gaps = np.where(held > 0, high - low, widths) + 2.0 * self.config.room
-        return T, gaps, held
+        return T, np.where(held > 0, high - low, widths) + 2.0 * self.config.room, held
 
     def _around(self, cloud: Array, scene: Array) -> Array:
         """Return the points (n, 3) that a hand at the object may touch: the object, and what is near it."""
@@ -336,8 +329,7 @@ def _extent(values: Array, counted: NDArray[np.bool_]) -> tuple[Array, Array]:
     """Return the least and the greatest (n,) of those `values` (n, m) that are `counted`; 0 where none is."""
     some = counted.any(axis=1)
     low = np.where(counted, values, np.inf).min(axis=1)
-    high = np.where(counted, values, -np.inf).max(axis=1)
-    return np.where(some, low, 0.0), np.where(some, high, 0.0)
+    return np.where(some, low, 0.0), np.where(some, np.where(counted, values, -np.inf).max(axis=1), 0.0)
 
 
 def upright(T: Array, yaw: float) -> Array:
@@ -346,8 +338,7 @@ def upright(T: Array, yaw: float) -> Array:
     A hand that looks across has its x axis down, one that looks down has it within a right angle of the heading `yaw`
     [rad]; see `grasp_pose`.
     """
-    heading = np.array([math.cos(yaw), math.sin(yaw), 0.0])
-    wanted = np.where(np.abs(T[:, 2, 2:3]) < ACROSS, -UP, heading)
+    wanted = np.where(np.abs(T[:, 2, 2:3]) < ACROSS, -UP, np.array([math.cos(yaw), math.sin(yaw), 0.0]))
     T = T.copy()
     T[np.einsum("ni,ni->n", T[:, :3, 0], wanted) < 0.0, :3, :2] *= -1.0
     return T

@@ -89,5 +89,4 @@ class Centroid(OpenLoop):
         down = gripper.approach[2] < -ACROSS
         depth = grasp_depth(target, self.config.depth, self.config.clearance) if down else self.config.reach
         pose = grasp_pose(target.position + depth * gripper.approach, gripper.yaw, -gripper.approach)
-        gap = self.config.gap if down else self.config.wide
-        return [Grasp(pose, gap, target.detection.score)]
+        return [Grasp(pose, self.config.gap if down else self.config.wide, target.detection.score)]

@@ -98,8 +98,7 @@ class DoorArc:
         self.hinge = door.hinge.copy()
         self._start, self._normal, self._prior = start[:2].copy(), door.normal, door.hinge.copy()
         self._places: list[Array] = []
-        along = np.array([-door.normal[1], door.normal[0]])
-        axes = np.column_stack([along, door.normal])
+        axes = np.column_stack([np.array([-door.normal[1], door.normal[0]]), door.normal])
         self._weight = axes @ np.diag(1.0 / np.square(SIGMA)) @ axes.T
         arm = self._start - self.hinge
         # The turn that brings the handle out of the door.

@@ -119,17 +119,7 @@ def _facts(
     held = slab & (np.abs(local[..., 1]) < 0.5 * gaps[:, None]) & (local[..., 2] < 0.0)
     depth = np.where(held, -local[..., 2], 0.0).max(axis=1) / 0.05
     columns = [
-        gaps / MAX_GAP,
-        np.array([grasp.score for grasp in grasps]),
-        middle[:, 1],
-        middle[:, 0],
-        middle[:, 2],
-        held.mean(axis=1),
-        depth,
-        -T[:, 2, 2],
-        T[:, 2, 1],
-        T[:, 2, 0],
-        spread[:, 1],
-        spread[:, 2],
-    ]
+        gaps / MAX_GAP, np.array([grasp.score for grasp in grasps]), middle[:, 1], middle[:, 0], middle[:, 2],
+        held.mean(axis=1), depth, -T[:, 2, 2], T[:, 2, 1], T[:, 2, 0], spread[:, 1], spread[:, 2],
+    ]  # fmt: skip
     return np.column_stack(columns).astype(np.float32)

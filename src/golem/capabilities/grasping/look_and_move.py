@@ -110,5 +110,4 @@ class LookAndMove(VisualServo):
         super().__init__(config or LookAndMoveConfig())
 
     def servo(self, target: LocalizedObject, grasp: Grasp, t: float) -> ServoLaw:
-        """Return the loop that refines `grasp`; see `GraspMethod`."""
         return StopAndGo(self.config, super().servo(target, grasp, t), t)

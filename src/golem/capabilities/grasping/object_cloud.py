@@ -80,8 +80,7 @@ def support_plane(points: Array, position: Array, seed: int = 0) -> tuple[Array,
     size = np.linalg.norm(normals, axis=1)
     a, normals = a[size > 1e-9], normals[size > 1e-9] / size[size > 1e-9, None]
     offsets = np.einsum("ij,ij->i", a, normals)
-    off = normals @ position - offsets
-    free = np.abs(off) > 0.75 * PLANE
+    free = np.abs(normals @ position - offsets) > 0.75 * PLANE
     tested = points[rng.permutation(len(points))[:TESTED]]
     counts = (np.abs(tested @ normals.T - offsets) < PLANE).sum(axis=0) * free
     if not len(counts) or counts.max() < SHARE * len(tested):
@@ -101,16 +100,15 @@ def piece(points: Array, position: Array) -> Array:
     return points[piece_at(points, position)] if len(points) else points
 
 
-def piece_at(points: Array, position: Array) -> NDArray[np.bool_]:
-    """Return which of `points` (n, 3), at least one, are of that piece."""
-    cells = np.floor((points - points.min(axis=0)) / CELL).astype(int)
+def piece_at(points: Array, position: Array, cell: float = CELL) -> NDArray[np.bool_]:
+    """Return which of `points` (n, 3), at least one, are of that piece; those of neighbouring cells [m] are of one."""
+    cells = np.floor((points - points.min(axis=0)) / cell).astype(int)
     taken = np.zeros(cells.max(axis=0) + 1, bool)
     taken[tuple(cells.T)] = True
     number = np.zeros(taken.shape, np.int32)
     ndimage.label(taken, np.ones((3, 3, 3)), output=number)
     own = number[tuple(cells.T)]
-    nearest = int(((points - position) ** 2).sum(axis=1).argmin())
-    return own == own[nearest]
+    return own == own[int(((points - position) ** 2).sum(axis=1).argmin())]
 
 
 def fullest(values: Array, layer: float) -> float:

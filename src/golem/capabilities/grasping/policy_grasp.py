@@ -84,5 +84,4 @@ class PolicyGrasp(Centroid):
         self._policy, self._options = open_policy(config or PolicyGraspConfig())
 
     def servo(self, target: LocalizedObject, grasp: Grasp, t: float) -> ServoLaw | None:
-        """Return the law; see `GraspMethod`."""
         return PolicyLaw(self._policy, self._options, target, grasp.gap)

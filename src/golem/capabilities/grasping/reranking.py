@@ -129,7 +129,6 @@ class Reranking:
         return sorted(done, key=lambda grasp: -grasp.score) + left
 
     def servo(self, target: LocalizedObject, grasp: Grasp, t: float) -> ServoLaw | None:
-        """Return the proposer's law; see `GraspMethod`."""
         return self._proposer.servo(target, grasp, t)
 
     def _space(self, q: Array, target: LocalizedObject, scene: Array, T_base_odom: Array) -> JointSpace:

@@ -99,8 +99,7 @@ def identify(motion: RecordedMotion, weight: float | None = None) -> Identified:
     Raises:
         IdentificationError: the motion does not excite what every joint is to be known by; names the joints.
     """
-    swing = np.percentile(motion.q, 95, axis=0) - np.percentile(motion.q, 5, axis=0)
-    _refuse(swing < 0.05)
+    _refuse(np.percentile(motion.q, 95, axis=0) - np.percentile(motion.q, 5, axis=0) < 0.05)
     delay, gain = find_delay(motion)
     q, gyro, acc = low_passed(motion.q), low_passed(motion.gyro), low_passed(motion.acc)
     dq, turn = np.gradient(q, TICK, axis=0), np.gradient(gyro, TICK, axis=0)

@@ -41,7 +41,6 @@ class LegSweep:
         self._t, self._start = 0.0, state.q.copy()
 
     def step(self, state: LowState, base: BaseEstimate, motion: LocomotionCommand, dt: float) -> LegCommand:
-        """Return where the legs are now; see `LowerBody.step`."""
         self._t += dt
         return LegCommand(swing(self._t, self._start)[LEGS], _GAINS.kp[LEGS].copy(), _GAINS.kd[LEGS].copy())
 
@@ -57,6 +56,5 @@ class ArmSweep:
         self._t, self._start = 0.0, q.copy()
 
     def step(self, targets_left: Array | None, targets_right: Array | None, q_measured: Array, dt: float) -> ArmCommand:
-        """Return where torso and arms are now; see `UpperBody.step`."""
         self._t += dt
         return ArmCommand(swing(self._t, self._start)[UPPER], np.zeros(2), np.zeros(2), False)

@@ -42,11 +42,7 @@ class Almi(Handover):
     """Walks as told with one shipped network, stands and takes shoves with the other; see `Handover`, `Policy`."""
 
     def __init__(self, config: AlmiConfig | None = None) -> None:
-        """Load the shipped descriptions and their networks.
-
-        Raises:
-            ConfigError: this installation lacks them, or a network given instead does not fit.
-        """
+        """Load the shipped networks. Raises ConfigError: they are not there, or one given instead does not fit."""
         config = config or AlmiConfig()
         for name in (WALK, STAND):
             if not (SHIPPED / f"{name}.yaml").is_file():

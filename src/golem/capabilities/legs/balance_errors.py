@@ -35,8 +35,7 @@ def heading(R: Array) -> tuple[float, float]:
 @njit(cache=True, nogil=True)
 def stand_errors(R: Array, com: Array, velocity: Array, soles: Array, stance: Array, out: Array) -> None:
     """Write what `balance_errors` returns of one robot into `out` (3,): capture point, misplacement."""
-    height = max(com[2] - min(soles[0, 2], soles[1, 2]), 0.1)
-    lead = math.sqrt(height / GRAVITY)
+    lead = math.sqrt(max(com[2] - min(soles[0, 2], soles[1, 2]), 0.1) / GRAVITY)
     x = com[0] + velocity[0] * lead - (soles[0, 0] + soles[1, 0]) / 2.0
     y = com[1] + velocity[1] * lead - (soles[0, 1] + soles[1, 1]) / 2.0
     c, s = heading(R)
@@ -117,11 +116,7 @@ def step_trim(m: Record, twist: Array, R: Array, velocity: Array, turn: float, d
 
 
 class VelocityIntegrator:
-    """The correction of one robot's twist.
-
-    Attributes:
-        memory: (1,) of `TRIM`.
-    """
+    """The correction of one robot's twist; `memory` is (1,) of `TRIM`."""
 
     def __init__(self, config: VelocityIntegratorConfig | None = None) -> None:
         self.config = c = config or VelocityIntegratorConfig()

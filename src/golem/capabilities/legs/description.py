@@ -79,11 +79,7 @@ class Description:
     newest_first: bool = False
 
     def outputs(self) -> NDArray[np.intp]:
-        """Return the motor that each output of the network moves, (n,).
-
-        Raises:
-            ConfigError: a joint does not exist, is named twice, or a leg motor is missing.
-        """
+        """Return the motor of each output, (n,). Raises ConfigError: one is unknown, named twice, or missing."""
         names = self.joints or JOINT_NAMES[LEGS]
         for name in names:
             if name not in JOINT_INDEX:
@@ -97,11 +93,7 @@ class Description:
         return np.array([JOINT_INDEX[name] for name in names], dtype=np.intp)
 
     def q0(self) -> Array:
-        """Return the default posture as (27,) [rad].
-
-        Raises:
-            ConfigError: it has another length, or is not finite.
-        """
+        """Return the default posture as (27,) [rad]. Raises ConfigError: it has another length, or is not finite."""
         if len(self.posture) == NUM_JOINTS:
             return vector("posture", self.posture, NUM_JOINTS)
         if len(self.posture) not in (JOINTS // 2, JOINTS):
@@ -113,11 +105,7 @@ class Description:
         return q
 
     def gains(self) -> tuple[Array, Array]:
-        """Return kp and kd, (12,) each.
-
-        Raises:
-            ConfigError: one has another length, or is negative or not finite.
-        """
+        """Return kp and kd, (12,) each. Raises ConfigError: one has another length, or is negative or not finite."""
         out = vector("kp", self.kp, JOINTS, JOINTS // 2), vector("kd", self.kd, JOINTS, JOINTS // 2)
         for name, values in zip(("kp", "kd"), out, strict=True):
             if values.min() < 0.0:
@@ -125,19 +113,11 @@ class Description:
         return out
 
     def action_scale(self) -> Array:
-        """Return the factor of each action, (12,) [rad].
-
-        Raises:
-            ConfigError: it has another length, or is not finite.
-        """
+        """Return the factor of each action, (12,) [rad]. Raises ConfigError: another length, or not finite."""
         return vector("action.scale", self.action.scale, JOINTS, JOINTS // 2)
 
     def layout(self) -> ObservationLayout:
-        """Return the observation's layout.
-
-        Raises:
-            ConfigError: see `ObservationLayout`.
-        """
+        """Return the observation's layout. Raises ConfigError: see `ObservationLayout`."""
         return ObservationLayout(self.observation, self.q0(), self.history, self.newest_first)
 
 
@@ -147,14 +127,11 @@ def shipped() -> tuple[str, ...]:
 
 
 def load_description(file: str | Path, network: str | Path | None = None) -> tuple[Description, Path]:
-    """Read a policy's description.
+    """Read a policy's description; return it and the path of the network, which may not exist.
 
     Args:
         file: path of a YAML file, or the name of a shipped description.
         network: path of the network; the file that the description names, beside it, if absent.
-
-    Returns:
-        The description, and the path of the network, which may not exist.
 
     Raises:
         ConfigError: no such file, not YAML, or a key or value that means nothing; names what would be valid.
@@ -181,11 +158,7 @@ def load_description(file: str | Path, network: str | Path | None = None) -> tup
 
 
 def check_description(d: Description) -> None:
-    """Raise where something in `d` cannot be meant.
-
-    Raises:
-        ConfigError: names what, and what would be valid.
-    """
+    """Raise ConfigError where something in `d` cannot be meant; it names what, and what would be valid."""
     if d.envelope.height is not None:
         raise ConfigError("No policy of a description takes a height today; leave out envelope.height.")
     d.gains()

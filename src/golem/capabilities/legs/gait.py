@@ -172,8 +172,7 @@ class Gait:
             dt: time since the previous tick [s].
         """
         points = np.ascontiguousarray(capture).reshape(-1, 2)
-        gaits = self.memory.reshape(-1)
-        _step_gaits(gaits, self.options, np.ravel(commanded), points, np.ravel(misplaced), dt)
+        _step_gaits(self.memory.reshape(-1), self.options, np.ravel(commanded), points, np.ravel(misplaced), dt)
 
 
 LIFT = np.array([0.0, -1.0, 0.0, 2.0, -1.0, 0.0])

@@ -103,11 +103,7 @@ def step_rest(m: Record, here: Array, feet: Array, contact: Array, moving: bool,
 
 
 class StopPredictor:
-    """Remembers the footprints of one robot, and how it stands above them.
-
-    Attributes:
-        memory: (1,) of `REST`.
-    """
+    """Remembers the footprints of one robot, and how it stands above them; `memory` is (1,) of `REST`."""
 
     def __init__(self) -> None:
         """Begin without footprints: the robot is taken to stay where it is."""
@@ -225,8 +221,7 @@ def _advance(seen: int, tree: int, gait: int, options: int, rest: int, trim: int
         x = T[0, 0] * R[0, 0] + T[0, 1] * R[1, 0] + T[0, 2] * R[2, 0]
         y = T[1, 0] * R[0, 0] + T[1, 1] * R[1, 0] + T[1, 2] * R[2, 0]
         feet[k, 2] = math.atan2(y, x)
-    moving = commanded or (g.stepping and not o.always)
-    step_rest(_rest_at(rest), here, feet, s.contact, moving, dt)
+    step_rest(_rest_at(rest), here, feet, s.contact, commanded or (g.stepping and not o.always), dt)
     for a in range(3):
         s.out[a] = s.twist[a]
     if not (commanded or g.stepping):
@@ -241,7 +236,6 @@ class GaitClock:
     """Runs gait, stop predictor and, if there is one, trim of one robot on one measurement."""
 
     def __init__(self, gait: Gait, rest: StopPredictor, trim: VelocityIntegrator | None) -> None:
-        """Advance `gait`, `rest` and `trim`."""
         tree, self._records = body_tree(), new_record(SEEN)
         self._seen = seen = self._records[0]
         learned = VelocityIntegrator() if trim is None else trim

@@ -130,7 +130,6 @@ class Handover:
         """Make both controllers.
 
         Args:
-            config: which ones.
             onboard: the robot's own computer, for a controller that speaks to it.
 
         Raises:
@@ -182,8 +181,9 @@ class Handover:
             asked = motion if self.walking or still else _standing(motion)
             command = self._active.step(state, base, asked, dt)
         if self._blend.active:
-            old = self._leaving.step(state, base, _standing(motion), dt)
-            command = self._blend.step(command, dt, old)
+            command = self._blend.step(command, dt, self._leaving.step(state, base, _standing(motion), dt))
+        if self._active.controller.gait is not self._own_gait:  # its legs changed hands, too
+            self._read_gait()
         self._last = command
         return command
 
@@ -198,9 +198,12 @@ class Handover:
         self._active = controller
         self.walking = controller is self._walk
         self.envelope: Envelope = self._envelopes[not self.walking]
-        gait = controller.controller.gait
-        self.gait: GaitConfig = gait if self.walking else gait.without_commands()
+        self._read_gait()
         self._coming: RateDivider | None = None
+
+    def _read_gait(self) -> None:
+        self._own_gait: GaitConfig = self._active.controller.gait
+        self.gait: GaitConfig = self._own_gait if self.walking else self._own_gait.without_commands()
 
     def _begin(self) -> None:
         self._take_over(self._stand)

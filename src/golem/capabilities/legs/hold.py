@@ -72,21 +72,12 @@ class HoldConfig:
 
 
 class JointHold:
-    """Moves the legs to a stance and keeps them there, whatever the twist.
-
-    Attributes:
-        rate, latency, envelope, gait: see `LowerBody`.
-        balances: a robot on its feet falls with it.
-    """
+    """Moves the legs to a stance and keeps them there, whatever the twist; a robot on its feet falls with it."""
 
     balances = False
 
     def __init__(self, config: HoldConfig | None = None) -> None:
-        """Look up the stance of `config`.
-
-        Raises:
-            ConfigError: the stance is unknown, the gains are not six each, or the speed is not positive.
-        """
+        """Look up the stance. Raises ConfigError: it is unknown, not six gains each, or no positive speed."""
         self.config = config or HoldConfig()
         if self.config.stance not in STANCES:
             raise unknown_name("stance", self.config.stance, STANCES)

@@ -25,7 +25,7 @@ from golem.capabilities.legs.handover import CommandBlender
 from golem.capabilities.legs.rate_divider import RateDivider
 from golem.interfaces.payloads import LegCommand
 from golem.options import require
-from golem.robots.model.leg_dynamics import LEG, LegDynamics
+from golem.robots.model.leg_kernel import LEG, LegDynamics
 from golem.robots.model.table import JOINT_NAMES
 from golem.types import LEGS, BaseEstimate, LowState, PlanarPose, Twist
 
@@ -59,11 +59,7 @@ class FootSeparation:
         self._legs = LegDynamics()
 
     def step(self, command: LegCommand, state: LowState, swings: Bools) -> LegCommand:
-        """Return what the legs are told instead of `command`.
-
-        Args:
-            swings: (2,) whether the left and the right leg swing, and carry no load.
-        """
+        """Return what the legs are told instead of `command`; `swings` (2,) says which leg carries no load."""
         if not swings.any():
             return command
         config, legs = self.config, self._legs
@@ -226,8 +222,7 @@ class Locomotion:
             command = self._blend.step(command, dt)
         if self._separation is None or not stepping:
             return command
-        swings = motion.phase >= self.gait.config.stance
-        return self._separation.step(command, state, swings & (base.contact < 0.5))
+        return self._separation.step(command, state, (motion.phase >= self.gait.config.stance) & (base.contact < 0.5))
 
     def _forget(self) -> None:
         self.commanded = self.applied = self._trimmed = ZERO
@@ -300,8 +295,7 @@ class Locomotion:
         goal = own if asked is None or waits else min(max(asked, low), high)
         if asked is not None and not low <= asked <= high:
             self.reason = self.reason or f"the commanded height is outside of {low:g} to {high:g} m"
-        now = own if self.height is None else self.height
-        self.height = _toward(now, goal, self.config.height_speed * dt)
+        self.height = _toward(own if self.height is None else self.height, goal, self.config.height_speed * dt)
         if self.height == own and (asked is None or waits):
             self.height = None
 
@@ -327,9 +321,7 @@ class Locomotion:
         if not self._moves and not self.gait.stepping:
             self._trimmed = ZERO
         else:
-            wanted = _values(self.applied)
-            axes = controller.envelope.axes
-            choices = zip(axes, trimmed.tolist(), wanted, strict=True)
+            choices = zip(controller.envelope.axes, trimmed.tolist(), _values(self.applied), strict=True)
             self._trimmed = Twist(*[new if own else old for own, new, old in choices])
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import onnxruntime
 from numpy.typing import NDArray
 
-from golem.errors import ConfigError, MissingExtra
+from golem.errors import ConfigError, needs
 
 Float32 = NDArray[np.float32]
 ACTIONS = 12
@@ -50,7 +50,6 @@ class OnnxNetwork:
     """
 
     def __init__(self, path: Path, size: int, actions: int = ACTIONS) -> None:
-        """Load `path`; see `load_network`."""
         session = onnx_session(path)
         inputs, outputs = session.get_inputs(), session.get_outputs()
         states = [tuple(i.shape) for i in inputs[1:]]
@@ -93,7 +92,6 @@ class OnnxNetwork:
             state[...] = 0.0
 
     def __call__(self, observation: Float32) -> Float32:
-        """Return the action; see `Network`."""
         self._x[...] = observation
         self._session.run_with_iobinding(self._binding)
         for state, after in zip(self._states, self._after, strict=True):
@@ -102,11 +100,7 @@ class OnnxNetwork:
 
 
 def onnx_session(path: Path) -> onnxruntime.InferenceSession:
-    """Return the network in `path`, to be run on one thread.
-
-    Raises:
-        ConfigError: there is none.
-    """
+    """Return the network in `path`, to be run on one thread. Raises ConfigError: there is none."""
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = 1
     options.inter_op_num_threads = 1
@@ -124,11 +118,8 @@ class TorchScriptNetwork:
     """
 
     def __init__(self, path: Path, size: int, actions: int = ACTIONS) -> None:
-        """Load `path`; see `load_network`."""
-        try:
+        with needs("torch", "train"):
             import torch
-        except ImportError as error:
-            raise MissingExtra("torch", "train") from error
         self._torch: Any = torch
         torch.set_num_threads(1)
         try:
@@ -151,7 +142,6 @@ class TorchScriptNetwork:
         self._forget()
 
     def __call__(self, observation: Float32) -> Float32:
-        """Return the action; see `Network`."""
         torch = self._torch
         with torch.no_grad():
             return self._module(torch.from_numpy(observation)[None]).numpy()[0]

@@ -160,12 +160,7 @@ def _look(
 
 
 class ObservationLayout:
-    """The order, offsets and scales of an observation.
-
-    Attributes:
-        size: number of values.
-        components: what each value of one tick is: term and component.
-    """
+    """The order, offsets and scales of an observation; `components` are the terms of one tick's values."""
 
     def __init__(
         self, terms: Sequence[Term], posture: Array, order: HistoryOrder = "term", newest_first: bool = False
@@ -262,18 +257,13 @@ def _history(terms: Sequence[Term], order: HistoryOrder, newest_first: bool) -> 
         places = places[::-1]
     if order == "frame":
         return places.ravel()
-    ends = np.cumsum([len(_components(t)) for t in terms])
-    blocks = np.split(places, ends[:-1], axis=1)
+    blocks = np.split(places, np.cumsum([len(_components(t)) for t in terms])[:-1], axis=1)
     cut = [b[: t.history] if newest_first else b[-t.history :] for b, t in zip(blocks, terms, strict=True)]
     return np.concatenate([block.ravel() for block in cut])
 
 
 def _components(term: Term) -> tuple[str, ...]:
-    """Return the components that `term` asks for.
-
-    Raises:
-        ConfigError: the term or a component does not exist.
-    """
+    """Return the components that `term` asks for. Raises ConfigError: the term or a component does not exist."""
     if term.term not in TERMS:
         raise unknown_name("observation term", term.term, TERMS)
     names = TERMS[term.term]

@@ -67,9 +67,6 @@ class Policy:
     """Runs a network on the observation its description lays out; its actions are offsets from a default posture.
 
     Joint targets are q0 + scale * clip(action) + swing; there is no feed-forward torque.
-
-    Attributes:
-        rate, latency, envelope, gait: see `LowerBody`.
     """
 
     def __init__(self, config: PolicyConfig) -> None:
@@ -92,11 +89,7 @@ class Policy:
 
     @classmethod
     def of(cls, description: Description, network: Network) -> Policy:
-        """Return the policy that runs `network` as `description` says.
-
-        Raises:
-            ConfigError: the description says something that it cannot mean.
-        """
+        """Return the policy that runs `network` as `description` says. Raises ConfigError: that cannot be meant."""
         policy = cls.__new__(cls)
         policy._follow(description, network)
         return policy
@@ -125,11 +118,7 @@ class Policy:
         self._network.reset()
 
     def step(self, state: LowState, base: BaseEstimate, motion: LocomotionCommand, dt: float) -> LegCommand:
-        """Run the network once; see `LowerBody.step`.
-
-        Raises:
-            BadAction: the network returned NaN or infinity.
-        """
+        """Run the network once; see `LowerBody.step`. Raises BadAction: the network returned NaN or infinity."""
         observation = self._layout.look(state, base, motion, self._action)
         action = self._network(observation.astype(np.float32)).astype(np.float64)
         q, own, gait = self._q0.copy(), self.description.action, self.gait

@@ -8,11 +8,7 @@ from golem.types import BaseEstimate, LowState
 
 
 class RateDivider:
-    """Steps a controller whenever its period has passed; in between its last command stands.
-
-    Attributes:
-        runs: how often it was run.
-    """
+    """Steps a controller whenever its period has passed; in between its last command stands."""
 
     def __init__(self, controller: LowerBody) -> None:
         """Run `controller`, whose first tick is the first of the loop."""

@@ -74,11 +74,7 @@ class VendorConfig:
 
     @property
     def loco_api(self) -> LocoApi:
-        """The loco service that is spoken to.
-
-        Raises:
-            ConfigError: `robot` has none.
-        """
+        """The loco service that is spoken to. Raises ConfigError: `robot` has none."""
         return loco_api(self.robot)
 
 
@@ -95,19 +91,14 @@ class Vendor:
     requires = ("onboard",)
 
     def __init__(self, config: VendorConfig | None = None, onboard: Onboard | None = None) -> None:
-        """Speak to `onboard`, which the stack supplies.
-
-        Raises:
-            ConfigError: the robot is unknown, a time is not positive, or there is nobody to speak to.
-        """
+        """Speak to `onboard`. Raises ConfigError: there is none, the robot is unknown, or a time is not positive."""
         self.config = c = config or VendorConfig()
         if onboard is None:
             raise ConfigError(
                 "lower_body: vendor needs the robot's own computer, which only a stack that runs on a twin connects to."
             )
         times = {name: getattr(c, name) for name in ("timeout", "stand_up", "refresh", "duration")}
-        rows = ((n, t, 0.0 < t < math.inf, "a positive time in seconds") for n, t in times.items())
-        require("vendor's ", *rows)
+        require("vendor's ", *((n, t, 0.0 < t < math.inf, "a positive time in seconds") for n, t in times.items()))
         if c.refresh >= c.duration:
             raise ConfigError(
                 f"vendor's refresh ({c.refresh:g} s) must be shorter than its duration ({c.duration:g} s), "

@@ -116,18 +116,10 @@ class WbcReport:
 
 
 class Wbc:
-    """The stance controller; it ignores the twist, and its envelope has heights only.
-
-    Attributes:
-        rate, latency, envelope, gait: see `LowerBody`.
-    """
+    """The stance controller; it ignores the twist, and its envelope has heights only."""
 
     def __init__(self, config: WbcConfig | None = None) -> None:
-        """Build the model and the program.
-
-        Raises:
-            ConfigError: unknown stance or torque profile, or not six values of kp and of kd.
-        """
+        """Build the program. Raises ConfigError: unknown stance or torque profile, not six values of kp and of kd."""
         self.config = c = config or WbcConfig()
         if c.stance not in STANCES:
             raise unknown_name("stance", c.stance, STANCES)
@@ -159,11 +151,7 @@ class Wbc:
         self._failures = 0
 
     def step(self, state: LowState, base: BaseEstimate, motion: LocomotionCommand, dt: float) -> LegCommand:
-        """Solve for this tick's torques; see `LowerBody.step`.
-
-        Raises:
-            StanceError: a measurement is not finite, or there was no solution for too many ticks.
-        """
+        """Solve for this tick's torques. Raises StanceError: a measurement is not finite, or no solution for long."""
         c, d = self.config, self._dynamics
         q = state.q[LEGS]
         rate = sensed_base_rate(state)
@@ -249,6 +237,5 @@ class Wbc:
             self._hold, self._height, self._share = q.copy(), height, float(loaded)
         reach = self.config.height_speed * dt
         self._height += min(max(wish - self._height, -reach), reach)
-        maximum = 1.0 if loaded else max(self._share, 0.5)
-        self._share = min(self._share + dt / self.config.engage, maximum)
+        self._share = min(self._share + dt / self.config.engage, 1.0 if loaded else max(self._share, 0.5))
         return self._hold

@@ -61,7 +61,6 @@ class StanceDynamics:
     """
 
     def __init__(self, hands: bool = True) -> None:
-        """Build the model, with or without the MAGPIE hands."""
         model = pinocchio_model.build(hands=hands, free_base=True)
         model.armature[6:] = DOF.armature
         center = pin.SE3(np.eye(3), SOLE_CENTER)
@@ -167,11 +166,7 @@ class Solution:
 
 
 class StanceProgram:
-    """Assembles and solves the program.
-
-    Attributes:
-        corners: (4, 3) where a sole pushes, from its centre, in the foot's axes [m].
-    """
+    """Assembles and solves the program. A sole pushes at `corners` (4, 3), from its centre, in the foot's axes [m]."""
 
     def __init__(self, torque: Array, friction: float, margin: float, weights: QpWeights) -> None:
         """Lay the constant parts out.
@@ -187,8 +182,7 @@ class StanceProgram:
         edges = np.array([[friction, 0, 1], [-friction, 0, 1], [0, friction, 1], [0, -friction, 1]])
         edges /= np.linalg.norm(edges, axis=1, keepdims=True)
         self._force = np.tile(edges.T, _CORNERS)
-        lever = np.repeat(self.corners, _EDGES, axis=0)
-        foot = np.concatenate([self._force, np.cross(lever, self._force.T).T])
+        foot = np.concatenate([self._force, np.cross(np.repeat(self.corners, _EDGES, axis=0), self._force.T).T])
         self._G = np.zeros((12, _RAYS))
         self._G[:6, : _RAYS // 2] = self._G[6:, _RAYS // 2 :] = foot
         self._weights = weights
@@ -238,6 +232,5 @@ class StanceProgram:
         if flag <= 0:
             return None
         rays = x[:_RAYS].reshape(2, _CORNERS, _EDGES)
-        edges = self._force[:, :_EDGES]
-        forces = np.einsum("fij,jk,fck->fci", dynamics.soles_R, edges, rays)
+        forces = np.einsum("fij,jk,fck->fci", dynamics.soles_R, self._force[:, :_EDGES], rays)
         return Solution(T @ x + t, forces, K @ x + k)

@@ -22,23 +22,14 @@ SHARE = 0.2
 
 
 class FloorPlane:
-    """Follows the plane z = a x + b y + c in odom.
-
-    Attributes:
-        plane: (3,) a, b [m/m] and c [m]; None before the first scan.
-    """
+    """Follows the plane z = a x + b y + c in odom: (3,) a, b [m/m] and c [m], None before the first scan."""
 
     def __init__(self) -> None:
         self.plane: Array | None = None
         self._found = False
 
     def update(self, points: Array, origin: Array) -> Array:
-        """Return the plane after one more scan.
-
-        Args:
-            points: (n, 3) in odom, finite [m].
-            origin: (3,) of the sensor.
-        """
+        """Return the plane after the (n, 3) `points` of a scan in odom, finite [m], from `origin` (3,)."""
         if self.plane is None:
             self.plane = np.array([0.0, 0.0, origin[2] - SENSOR_HEIGHT])
         tolerance = FOLLOW if self._found else BEGIN

@@ -51,11 +51,7 @@ class StoredMap:
 
 
 def save_map(path: Path, stored: StoredMap) -> None:
-    """Write `PATH.yaml`, `PATH.pgm` and `PATH.npz`; the folder is made.
-
-    Raises:
-        OutputError: it cannot be written.
-    """
+    """Write `PATH.yaml`, `PATH.pgm` and `PATH.npz`; the folder is made. Raises OutputError: it cannot be written."""
     base = path.with_suffix("") if path.suffix in (".yaml", ".yml") else path
     cells = stored.cells
     image = np.full(cells.shape, _WRITTEN[-1], np.uint8)
@@ -74,8 +70,7 @@ def save_map(path: Path, stored: StoredMap) -> None:
     }
     try:
         base.parent.mkdir(parents=True, exist_ok=True)
-        header = f"P5\n{columns} {rows}\n255\n".encode()
-        base.with_name(f"{base.name}.pgm").write_bytes(header + image[::-1].tobytes())
+        base.with_name(f"{base.name}.pgm").write_bytes(f"P5\n{columns} {rows}\n255\n".encode() + image[::-1].tobytes())
         base.with_name(f"{base.name}.yaml").write_text(yaml.safe_dump(facts, sort_keys=False), encoding="utf-8")
         with base.with_name(f"{base.name}{CLOUD}").open("wb") as file:
             np.savez_compressed(file, cloud=stored.cloud.astype(np.float32), walls=stored.walls)
@@ -84,12 +79,8 @@ def save_map(path: Path, stored: StoredMap) -> None:
 
 
 def load_map(path: Path) -> StoredMap:
-    """Read a map that `save_map`, or ROS's map_saver, wrote.
-
-    Raises:
-        ConfigError: a file is missing or is no map; says which and why.
-    """
-    file = path if path.suffix in (".yaml", ".yml") else path.with_name(f"{path.name}.yaml")
+    """Read a map of `save_map` or of ROS's map_saver. Raises ConfigError: a file is missing or no map; says why."""
+    file = path if path.suffix in (".yaml", ".yml") else Path(f"{path}.yaml")
     try:
         facts = read_yaml(file.read_text(encoding="utf-8"), f"The map '{file}'")
     except (OSError, UnicodeDecodeError) as error:

@@ -21,11 +21,7 @@ beside where they say (profile `field`: by up to 75 mm in 40 robots)."""
 
 
 class RobotFilter:
-    """Knows the robot's spheres.
-
-    Attributes:
-        model: them, on the 27 joints in motor order.
-    """
+    """Knows the robot's spheres: `model` has them, on the 27 joints in motor order."""
 
     def __init__(self) -> None:
         self.model = CollisionModel(load_spheres())

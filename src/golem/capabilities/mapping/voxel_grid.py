@@ -210,21 +210,16 @@ class GridConfig:
 
 
 class VoxelGridMapper:
-    """See `Mapper`; one scan costs some milliseconds.
+    """Voxels of what was seen, and the map of the floor from them; see `Mapper`. A scan costs some milliseconds.
 
     Attributes:
-        rate: grids per second [Hz].
         before: the map from before; None where the options name none.
     """
 
     rate = 2.0
 
     def __init__(self, config: GridConfig | None = None) -> None:
-        """Read the map from before, if there is one.
-
-        Raises:
-            ConfigError: it cannot be read.
-        """
+        """Read the map from before, if there is one. Raises ConfigError: it cannot be read."""
         self.config = config or GridConfig()
         self.before = load_map(Path(self.config.file)) if self.config.file else None
         self._marks: Landmarks | None = None
@@ -234,11 +229,9 @@ class VoxelGridMapper:
 
     @property
     def T_odom_map(self) -> PlanarPose | None:
-        """Where the map's frame is in odom; see `Mapper`."""
         return self._T_odom_map if self._located or self.before is None else None
 
     def reset(self) -> None:
-        """Forget what was seen; see `Mapper`."""
         self.voxels = VoxelMap(self.config.resolution, self.config.band)
         self.walls = WallMeans(self.config.resolution)
         self.floor: Array | None = None
@@ -250,7 +243,6 @@ class VoxelGridMapper:
         self._newest: Array = np.zeros((0, 2))
 
     def add_scan(self, scan: Scan) -> None:
-        """Take one scan; see `Mapper`."""
         fresh = self._t < scan.t < (math.inf if self._t == -math.inf else self._t + LATE)
         if not fresh or not np.isfinite([*scan.origin, *scan.floor]).all():
             return
@@ -268,7 +260,6 @@ class VoxelGridMapper:
         self._follow()
 
     def grid(self) -> OccupancyGrid | None:
-        """Return the map of the floor; see `Mapper`."""
         if self.voxels.empty or self.floor is None or self.T_odom_map is None:
             return None
         cells = self.voxels.flatten(self.floor)
@@ -294,7 +285,6 @@ class VoxelGridMapper:
         return ""
 
     def stored(self) -> StoredMap | None:
-        """Return what there is, in the map's own frame; see `Mapper`."""
         grid = self.grid()
         if grid is None:
             return None
@@ -302,8 +292,7 @@ class VoxelGridMapper:
         own = grid.in_map
         voxels = self.voxels.occupied()
         back = self._T_odom_map.to(PlanarPose(0.0, 0.0, 0.0)).matrix()
-        cloud = voxels @ back[:3, :3].T + back[:3, 3]
-        return StoredMap(own.origin, own.resolution, own.cells, cloud, places)
+        return StoredMap(own.origin, own.resolution, own.cells, voxels @ back[:3, :3].T + back[:3, 3], places)
 
     def _follow(self) -> None:
         """Find the place in the map from before at first, and correct it from time to time."""
@@ -323,8 +312,7 @@ class VoxelGridMapper:
     def _place(self, match: Match, share: float) -> None:
         """Go `share` of the way to where a scan in odom fits into the map."""
         origin = PlanarPose(0.0, 0.0, 0.0)
-        T_map_odom = self._T_odom_map.to(origin).toward(match.pose, share)
-        self._T_odom_map, self._located = T_map_odom.to(origin), True
+        self._T_odom_map, self._located = self._T_odom_map.to(origin).toward(match.pose, share).to(origin), True
 
     def _overlaid(self, stored: StoredMap) -> OccupancyGrid:
         """Return the map from before with what this run saw drawn into it."""

@@ -36,12 +36,7 @@ class ImageTextEncoder:
     """Images and words as vectors whose angle says how well they fit; see `FrameEncoder`."""
 
     def __init__(self, network: Network, weights: Path) -> None:
-        """Load network and processor.
-
-        Raises:
-            MissingExtra: the extra `vision` is not installed.
-            ConfigError: there is no such network, or the folder `weights` holds none.
-        """
+        """Load the network. Raises MissingExtra: no extra `vision`; ConfigError: no such network in `weights`."""
         if network not in NETWORKS:
             raise unknown_name("encoder", network, NETWORKS)
         self._model, self._processor = load_model(weights, network, *NETWORKS[network])
@@ -157,11 +152,7 @@ class FrameIndexConfig:
             )
 
     def create(self) -> FrameEncoder:
-        """Return the encoder.
-
-        Raises:
-            MissingExtra, ConfigError: see `ImageTextEncoder`.
-        """
+        """Return the encoder. Raises MissingExtra, ConfigError: see `ImageTextEncoder`."""
         if self.encoder == "labels" or self.weights is None:
             return BagOfLabels()
         return ImageTextEncoder(self.encoder, self.weights)
@@ -202,8 +193,7 @@ class FrameIndex:
         similar = self._matrix @ wanted
         if when == "at" and at is not None:
             similar[np.array(self._times) > at] = 0.0
-        order = np.argsort(-similar, kind="stable")
-        best = order[: int(np.count_nonzero(similar >= self._config.least))]
+        best = np.argsort(-similar, kind="stable")[: int(np.count_nonzero(similar >= self._config.least))]
         return apart((self._place(text, k, float(similar[k])) for k in best), self._config.spread, limit)
 
     def _place(self, text: str, k: int, similar: float) -> Place:

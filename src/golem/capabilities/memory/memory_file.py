@@ -46,7 +46,6 @@ class ObjectRecords:
         self._next = 0
 
     def __len__(self) -> int:
-        """Return how many there are."""
         return len(self._labels)
 
     @property
@@ -119,11 +118,7 @@ class SqliteFile:
     """`NORMAL`: what was written survives the process. `FULL`: also a loss of power."""
 
     def __init__(self, path: Path) -> None:
-        """Open or make the file.
-
-        Raises:
-            GolemError: a `fault`: it cannot be opened or written, another process has it, or it is none of ours.
-        """
+        """Open or make the file. Raises GolemError, a `fault`: it cannot be used, is foreign, or another process's."""
         self.path = path
         with self._faults():
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -186,11 +181,7 @@ class MemoryFile(SqliteFile):
     )
 
     def read(self) -> tuple[list[ObjectRow], float]:
-        """Return every object, and the time of the last look [s], -inf where there was none.
-
-        Raises:
-            MemoryFault: the file is damaged.
-        """
+        """Return every object, and the time of the last look [s], -inf for none. Raises MemoryFault: damaged."""
         with self._faults():
             rows = self._base.execute("SELECT * FROM objects ORDER BY number").fetchall()
             last = self._base.execute("SELECT last FROM clock").fetchone()
@@ -198,11 +189,7 @@ class MemoryFile(SqliteFile):
         return objects, -np.inf if last is None else float(last[0])
 
     def write(self, changed: Iterable[ObjectRow], removed: Iterable[int], last: float) -> None:
-        """Keep what changed: all of it or, when this raises, nothing.
-
-        Raises:
-            MemoryFault: the disk is full or cannot be written.
-        """
+        """Keep what changed: all or, when this raises, nothing. Raises MemoryFault: the disk cannot be written."""
         marks = ", ".join("?" * (2 + len(COLUMNS)))
         rows = [(row.number, row.label, *row.values.tolist()) for row in changed]
         with self._writing() as base:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from enum import Enum
 from itertools import islice
 from pathlib import Path
 
@@ -13,7 +14,6 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from golem.capabilities.memory.base import Evidence, Observation, Place, When, check_observation, check_query
-from golem.capabilities.memory.look import Look, look_at
 from golem.capabilities.memory.memory_file import (
     BELIEF,
     EVIDENCE,
@@ -28,8 +28,70 @@ from golem.capabilities.memory.memory_file import (
     ObjectRecords,
 )
 from golem.capabilities.memory.words import label_scores
+from golem.capabilities.perception.lift import standing_middle
 from golem.errors import ConfigError
-from golem.types import Array, LocalizedObject
+from golem.robots.sensors.cameras import project
+from golem.types import Array, LocalizedObject, RgbdImage
+
+BEHIND = 0.05
+"""How far behind an object's place, its middle, and the standard deviation the surface of a look through it has to be
+[m]: what is seen of itself is hardly behind that."""
+LEVEL = 0.3
+"""Sine of the angle off the vertical from which on a view has an upper half."""
+SHARE = 0.9
+"""Share of the window that has to be seen through."""
+MARGIN = 1.5
+"""The window is wider than the object by this many standard deviations of its place, to each side."""
+SMALLEST = 3
+"""Least half width of a window [px]; a smaller object's absence is not judged."""
+VALID = 0.5
+"""Least share of a window with depth."""
+
+
+class Look(Enum):
+    """What a look says of one expected object."""
+
+    OUT_OF_VIEW = "out of view"
+    HIDDEN = "hidden"
+    EMPTY = "empty"
+    THROUGH = "through"
+
+
+def look_at(frame: RgbdImage, positions: Array, sizes: Array, sigmas: Array) -> list[Look]:
+    """Return what the frame says of objects that it did not detect.
+
+    Args:
+        positions: (n, 3) where they are expected, in the frame of `frame.T_odom_optical` [m].
+        sizes: (n,) their radii [m].
+        sigmas: (n,) standard deviations of their positions, relative to the frame [m].
+    """
+    info = frame.info
+    T = np.linalg.inv(frame.T_odom_optical)
+    optical = np.asarray(positions, float) @ T[:3, :3].T + T[:3, 3]
+    out = [Look.OUT_OF_VIEW] * len(optical)
+    depth, up = optical[:, 2], T[:2, 2]
+    near = (depth > info.near) & (depth < info.far)
+    for k in np.flatnonzero(near):
+        x, y = project(info, optical[k])
+        half = info.fx * (sizes[k] + MARGIN * sigmas[k]) / depth[k]
+        x0, x1, y0, y1 = round(x - half), round(x + half), round(y - half), round(y + half)
+        if half < SMALLEST or x0 < 0 or y0 < 0 or x1 >= info.width or y1 >= info.height:
+            continue
+        window = frame.depth[y0 : y1 + 1, x0 : x1 + 1]
+        if np.hypot(*up) > LEVEL:  # below its middle is what it stands on
+            right, down = np.arange(x0, x1 + 1) - x, np.arange(y0, y1 + 1) - y
+            window = window[up[0] * right[None, :] + up[1] * down[:, None] >= 0.0]
+        valid = window[window > 0.0]
+        if len(valid) < VALID * window.size:
+            continue
+        behind = np.mean(valid > depth[k] + sigmas[k] + BEHIND)
+        before = np.mean(valid < depth[k] - sizes[k] - MARGIN * sigmas[k] - BEHIND)
+        if behind >= SHARE:
+            out[k] = Look.THROUGH
+        else:
+            out[k] = Look.HIDDEN if before > 1.0 - SHARE else Look.EMPTY
+    return out
+
 
 LEAST = 0.15
 """Log odds of a detection that is as likely wrong as right, by its score: what is found again and again is there."""
@@ -58,6 +120,13 @@ def gain_of(score: float, most: float) -> float:
     return min(max(math.log(share / (1.0 - share)), LEAST), most)
 
 
+def place_of(found: LocalizedObject, eye: Array) -> Array:
+    """Return the place of an object (3,) [m] seen from `eye` (3,): its middle, which looks from elsewhere show, too."""
+    if len(found.points) < 4:
+        return found.position
+    return np.array([*standing_middle(found.points, eye), found.position[2]])
+
+
 def size_of(found: LocalizedObject) -> float:
     """Return the radius of an object [m], by the spread of its points."""
     if len(found.points) < 4:
@@ -73,8 +142,6 @@ def outvoted(records: ObjectRecords, row: int, gate: float, tie: float) -> bool:
     for which there is more evidence; where there is as much for both, both are answered.
 
     Args:
-        records: all objects.
-        row: of the one in question.
         gate: within how many standard deviations two places are one.
         tie: difference of log odds up to which there is as much evidence for both.
     """
@@ -103,8 +170,7 @@ def _rivals(records: ObjectRecords, row: int, gate: float) -> NDArray[np.intp]:
     same_place = np.linalg.norm(others[:, PLACE] - mine[PLACE], axis=1) <= reach
     alive_together = _overlap(others, mine, GONE)
     seen_by_turns = _overlap(others, mine, LAST) if mine[LOOKS] > 1.0 else alive_together
-    together = others[:, LAST] == mine[LAST]
-    chosen = near[same_place & alive_together & seen_by_turns & ~together]
+    chosen = near[same_place & alive_together & seen_by_turns & (others[:, LAST] != mine[LAST])]
     return np.array([k for k in chosen if records.label(k) != label], np.intp)
 
 
@@ -155,11 +221,7 @@ class ObjectMap:
     """The objects that were seen, where they are, and where they were."""
 
     def __init__(self, config: ObjectMapConfig | None = None) -> None:
-        """Open the memory.
-
-        Raises:
-            MemoryFault: the file cannot be used.
-        """
+        """Open the memory. Raises MemoryFault: the file cannot be used."""
         self._config = config or ObjectMapConfig()
         self._records = ObjectRecords()
         self.last = -math.inf
@@ -201,7 +263,7 @@ class ObjectMap:
         changed: set[int] = set()
         for label in dict.fromkeys(found.label for found in observation.objects):
             seen = [found for found in observation.objects if found.label == label]
-            places = np.array([found.position for found in seen])
+            places = np.array([place_of(found, eye) for found in seen])
             far = np.linalg.norm(places - eye, axis=1)
             variances = observation.pose_sigma**2 + (config.depth_noise * far**2) ** 2
             rows = records.rows(label)

@@ -62,11 +62,7 @@ class PictureJudge:
     """Has Gemini look at the pictures of places."""
 
     def __init__(self, config: PictureJudgeConfig, near: float, sleep: Callable[[float], None] = time.sleep) -> None:
-        """Take the key from the environment; looks at points up to `near` [m] apart are of one place.
-
-        Raises:
-            ConfigError: there is no key.
-        """
+        """Take the key from the environment; looks within `near` [m] are of one place. Raises ConfigError: no key."""
         self._config, self._near = config, near
         self._service = gemini_service.GeminiService(config, "Re-ranking by gemini", "choose the judge objects", sleep)
         self._pictures: deque[_Picture] = deque(maxlen=config.pictures)
@@ -83,11 +79,7 @@ class PictureJudge:
         self.last = frame.t
 
     def order(self, text: str, when: When, at: float | None, proposed: Sequence[Place], limit: int) -> list[Place]:
-        """Return those of the proposed places that answer by what the model sees.
-
-        Raises:
-            ServiceUnavailable: see `GeminiService.ask`.
-        """
+        """Return those of the places that answer by what the model sees. Raises as `GeminiService.ask` does."""
         pairs: list[tuple[_Picture, _Picture]] = []
         for place in proposed:
             then = next((p for p in self._pictures if p.t == place.last_seen), None)
@@ -221,11 +213,7 @@ class ObjectJudge:
     """Orders places by an `ObjectMap`."""
 
     def __init__(self, config: RerankedConfig) -> None:
-        """Open it.
-
-        Raises:
-            MemoryFault: its file cannot be used.
-        """
+        """Open it. Raises MemoryFault: its file cannot be used."""
         self._config = config
         self._objects = ObjectMap(config.objects)
 
@@ -283,11 +271,7 @@ class Reranked:
         self.last = self._judge.last
 
     def query(self, text: str, when: When = "now", at: float | None = None, limit: int = 5) -> list[Place]:
-        """See `Memory.query`: places that the judge confirms, with their times.
-
-        Raises:
-            ServiceUnavailable: the judge is gemini, and it does not answer.
-        """
+        """See `Memory.query`: places that the judge confirms. Raises ServiceUnavailable: gemini does not answer."""
         check_query(text, when, at, limit)
         proposed = self._proposer.query(text, "anywhere", None, self._config.candidates)
         return self._judge.order(text, when, at, proposed, limit)

@@ -94,8 +94,7 @@ class TopDownMap:
             for (x, y), cell in self._cells.items():
                 share = cell.shares.get(label, 0.0) / max(cell.looks, 1.0)
                 if share > 0.0:
-                    middle = self._config.cell * (np.array([x, y]) + 0.5)
-                    place = np.append(middle, cell.heights[label])
+                    place = np.append(self._config.cell * (np.array([x, y]) + 0.5), cell.heights[label])
                     found.append(Place(label, place, score * min(share, 1.0), cell.first, cell.last, "similar"))
         return apart(sorted(found, key=lambda p: -p.score), self._config.spread, limit)
 

@@ -17,17 +17,12 @@ from golem.types import Array, PlanarPose
 
 
 class Way:
-    """Places in their order.
-
-    Attributes:
-        points: (n, 2) at most a cell apart, n at least 1 [m].
-    """
+    """Places in their order: `points` (n, 2) at most a cell apart, n at least 1 [m]."""
 
     def __init__(self, points: Array) -> None:
         """Follow `points`, with the corners of the grid taken off."""
         self.points = _smooth(points)
-        steps = np.linalg.norm(np.diff(self.points, axis=0), axis=1)
-        self._along: Array = np.concatenate([[0.0], np.cumsum(steps)])
+        self._along: Array = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(self.points, axis=0), axis=1))])
 
     def nearest(self, pose: PlanarPose) -> tuple[int, float]:
         """Return the place nearest to a pose, and its distance [m]."""
@@ -43,8 +38,7 @@ class Way:
         """Return the place `distance` [m] ahead of place `i`, or the end, and the heading of the way there."""
         j = min(int(np.searchsorted(self._along, self._along[i] + distance)), len(self.points) - 1)
         a, b = self.points[max(0, j - 4)], self.points[j]
-        heading = math.atan2(b[1] - a[1], b[0] - a[0]) if j > 0 else 0.0
-        return PlanarPose(float(b[0]), float(b[1]), heading)
+        return PlanarPose(float(b[0]), float(b[1]), math.atan2(b[1] - a[1], b[0] - a[0]) if j > 0 else 0.0)
 
 
 def _smooth(points: Array, width: int = 5) -> Array:
@@ -64,7 +58,7 @@ Cell = tuple[int, int]
 
 
 def astar(cost: Array, start: Cell, goal: Cell, beta: float, closed: float) -> tuple[NDArray[np.int64], float] | None:
-    """Return the cheapest way.
+    """Return the cheapest way, (n, 2) cells from start to goal, and the sum; None where there is no way.
 
     Args:
         cost: (rows, columns) C of each cell, not negative.
@@ -72,9 +66,6 @@ def astar(cost: Array, start: Cell, goal: Cell, beta: float, closed: float) -> t
         goal: last cell, inside.
         beta: weight of C against length, not negative.
         closed: cells with a cost of this and more cannot be entered.
-
-    Returns:
-        (n, 2) cells from start to goal, and the sum; None where there is no way.
     """
     rows, columns = cost.shape
     parents = np.full(rows * columns, -1, np.int32)

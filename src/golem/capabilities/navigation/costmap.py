@@ -129,6 +129,5 @@ def distance_to(full: NDArray[np.bool_], resolution: float) -> Array:
     """Return the distance of each cell from the nearest full one [m], at most 10 m."""
     if not full.any():
         return np.full(full.shape, 10.0)
-    free = np.where(full, 0, 255).astype(np.uint8)
-    distance = cv2.distanceTransform(free, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    distance = cv2.distanceTransform(np.where(full, 0, 255).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     return np.minimum(distance.astype(np.float64) * resolution, 10.0)

@@ -27,12 +27,7 @@ from golem.types import Array, PlanarPose, Twist
 
 @dataclass(frozen=True, slots=True)
 class NoWay:
-    """That there is no way.
-
-    Attributes:
-        why: one sentence.
-        final: whether it is so however long the robot waits and wherever it backs up to.
-    """
+    """That there is no way; `final` where neither time nor a place that the robot backs up to changes that."""
 
     why: str
     final: bool = False
@@ -151,12 +146,7 @@ class CostmapAstarConfig:
 
 
 class CostmapAstar:
-    """See `Navigator`.
-
-    Attributes:
-        rate: steps per second [Hz].
-        latency: time of a step with a search [s].
-    """
+    """Finds a way around what is on the map, in `latency` [s], and follows it; see `Navigator`."""
 
     requires = ("scan",)
     rate = 20.0
@@ -175,7 +165,6 @@ class CostmapAstar:
         self.start(PlanarPose(0.0, 0.0, 0.0))
 
     def start(self, goal: PlanarPose) -> None:
-        """Pursue `goal`; see `Navigator`."""
         self._goal = goal
         self._way: Way | None = None
         self._why, self._final = "", False
@@ -194,7 +183,6 @@ class CostmapAstar:
         self._mark, self._marked = PlanarPose(math.inf, 0.0, 0.0), 0.0
 
     def step(self, inputs: NavInputs, dt: float) -> NavStep:
-        """Return the twist of this step; see `Navigator`."""
         return replace(self._step(inputs, dt), people=self._around.people)
 
     def _step(self, inputs: NavInputs, dt: float) -> NavStep:
@@ -286,8 +274,7 @@ class CostmapAstar:
         if aside > ASIDE:
             return True
         beta = self.config.beta
-        rest = way_cost(costmap, old.points[i:], beta)
-        return way_cost(costmap, new.points, beta) < KEEP * rest
+        return way_cost(costmap, new.points, beta) < KEEP * way_cost(costmap, old.points[i:], beta)
 
     def _may_approach(self, left: PlanarPose) -> bool:
         """Return whether the goal is near, and nothing stands between."""
@@ -297,8 +284,7 @@ class CostmapAstar:
         around = self._around
         steps = max(1, math.ceil(distance / 0.1))
         between = (self._pose.toward(self._goal, i / steps) for i in range(1, steps + 1))
-        rooms = [self._local.room(p, self._footprint, around) for p in between]
-        return min(rooms) > 0.5 * self.config.local.margin
+        return min(self._local.room(p, self._footprint, around) for p in between) > 0.5 * self.config.local.margin
 
     def _finish(self, inputs: NavInputs, dt: float) -> NavStep:
         step = self._approach.step(inputs, dt)

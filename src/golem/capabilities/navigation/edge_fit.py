@@ -33,7 +33,6 @@ class NearEdge:
         pose: middle of the edge, heading across it, away from the robot; in the frame of the points.
         length: between its ends [m].
         spread: RMS distance of the slices' points from the line [m].
-        slices: how many there are.
         height: of the top above the floor [m]; NaN where nobody said.
     """
 
@@ -58,11 +57,9 @@ def table_height(local: Array, heights: Array) -> float | None:
         return None
     count, edges = np.histogram(heights[ahead], bins=round((high - low) / LEVEL), range=LEVELS)
     # Three levels together: the noise of the ranges spreads a surface over as many.
-    together = np.convolve(count, np.ones(3), mode="same")
-    best = int(together.argmax())
+    best = int(np.convolve(count, np.ones(3), mode="same").argmax())
     near = slice(max(best - 1, 0), best + 2)
-    middles = 0.5 * (edges[1:] + edges[:-1])
-    return float(np.average(middles[near], weights=count[near]))
+    return float(np.average((0.5 * (edges[1:] + edges[:-1]))[near], weights=count[near]))
 
 
 def near_edge(points: Array, view: PlanarPose, reach: float = 2.5, half_width: float = 1.4) -> NearEdge | str:
@@ -104,8 +101,7 @@ def _rim(local: Array) -> Array:
     for k in np.unique(slices):
         part = local[slices == k]
         if len(part) >= 5:
-            x = float(np.quantile(part[:, 0], 0.1))
-            found.append((x, float(np.median(part[:, 1]))))
+            found.append((float(np.quantile(part[:, 0], 0.1)), float(np.median(part[:, 1]))))
     return np.array(found).reshape(-1, 2)
 
 

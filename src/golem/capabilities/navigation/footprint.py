@@ -32,12 +32,7 @@ class Footprint:
 
     @classmethod
     def around(cls, balls: Array, margin: float = 0.0) -> Footprint:
-        """Return the footprint of balls.
-
-        Args:
-            balls: (n, 4) centre in base_link and radius [m].
-            margin: by how much it is wider [m].
-        """
+        """Return the footprint, wider by `margin` [m], of `balls` (n, 4): centre in base_link and radius [m]."""
         turns = np.linspace(0.0, math.tau, 12, endpoint=False)
         circle = np.column_stack([np.cos(turns), np.sin(turns)])
         points = (balls[:, None, :2] + (balls[:, 3, None, None] + margin) * circle).reshape(-1, 2)

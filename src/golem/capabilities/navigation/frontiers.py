@@ -17,12 +17,7 @@ SMALLEST = 0.6
 
 @dataclass(frozen=True, slots=True)
 class Frontier:
-    """One border between free and unknown.
-
-    Attributes:
-        pose: a free place near it, heading to its middle.
-        length: of the border [m].
-    """
+    """A border of free and unknown, `length` [m]; `pose` is a free place near it, heading to its middle."""
 
     pose: PlanarPose
     length: float

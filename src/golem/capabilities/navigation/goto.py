@@ -22,8 +22,6 @@ ZERO = Twist()
 
 MAX_COAST = (0.3, 0.3, 0.5)
 """Furthest that a stop may be expected to move the robot ahead, to its left [m] and round [rad] [own]."""
-A_STEP = 0.15
-"""How far legs may come from their place at one step [m] [own]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,8 +41,6 @@ class GoToConfig:
         dwell: for so long [s]: half a period of the gait and more.
         accept, straight: errors after the stop with which it stays [m], [rad].
         widen: factor on these two with every time it started over: a robot that stops no better is not chased for ever.
-        patience: time in motion nearer than 0.15 m from which on these bounds and the two before grow by that factor in
-            a second [s]: legs that only lean at a small twist, and then step farther, never come nearer.
         rest: time without a step over which the pose is averaged, and after which the robot is judged to stand or
             starts over [s].
         settle: time without a step before that, in which other legs take over, the body comes to rest and old poses
@@ -68,7 +64,6 @@ class GoToConfig:
     accept: float = 0.025
     straight: float = 0.03
     widen: float = 1.2
-    patience: float = 5.0
     rest: float = 1.0
     settle: float = 1.5
     march: float = 1.5
@@ -78,7 +73,7 @@ class GoToConfig:
     def __post_init__(self) -> None:
         positive = ("gain", "face", "pulse", "creep", "smoothing", "close", "aligned", "accept", "straight")
         values = {name: getattr(self, name) for name in positive} | {"speed": min(self.speed)}
-        times = {name: getattr(self, name) for name in ("dwell", "patience", "rest", "settle", "march")}
+        times = {name: getattr(self, name) for name in ("dwell", "rest", "settle", "march")}
         require(
             "goto option ",
             *((n, v, 0.0 < v < math.inf, "a positive number") for n, v in values.items()),
@@ -92,7 +87,6 @@ class GoTo:
     """Follows the straight line to the goal; see `Navigator`.
 
     Attributes:
-        rate: steps per second [Hz].
         latency: none: a step takes some 50 microseconds.
     """
 
@@ -100,14 +94,12 @@ class GoTo:
     latency = 0.0
 
     def __init__(self, config: GoToConfig | None = None) -> None:
-        """Begin without a goal: the place of the first pose."""
         self.config = config or GoToConfig()
         self._goal: PlanarPose | None = None
         self._coast = PlanarPose(*self.config.coast)
         self._forget()
 
     def start(self, goal: PlanarPose) -> None:
-        """Pursue `goal`; see `Navigator`."""
         self._goal = goal
         self._forget()
 
@@ -124,8 +116,6 @@ class GoTo:
         left = (here @ self._coast if moving else here).to(self._goal)
         distance, turn = math.hypot(left.x, left.y), abs(left.yaw)
         if self._walking:
-            self._around += dt if distance < A_STEP else 0.0
-            self._slack *= config.widen**dt if self._around > config.patience else 1.0
             steady = not moving or self._moved >= config.march
             near = steady and distance < self._slack * config.close and turn < self._slack * config.aligned
             self._near = self._near + dt if near else 0.0
@@ -147,7 +137,7 @@ class GoTo:
     def _forget(self) -> None:
         self._pose: Array | None = None
         self._velocity: Array = np.zeros(3)
-        self._rested = self._moved = self._near = self._around = 0.0
+        self._rested = self._moved = self._near = 0.0
         self._sum: Array = np.zeros(3)
         self._sent_from: PlanarPose | None = None
         self._slack = 1.0
@@ -185,8 +175,7 @@ class GoTo:
     def _towards(self, left: PlanarPose, minimum: float) -> Twist:
         """Return the twist along the straight line to the goal that is `left`, within bounds, and of size `least`."""
         config = self.config
-        distance = math.hypot(left.x, left.y)
-        turn = math.atan2(left.y, left.x) if distance > config.face else left.yaw
+        turn = math.atan2(left.y, left.x) if math.hypot(left.x, left.y) > config.face else left.yaw
         line = config.gain * np.array([left.x, left.y])
         # One factor for both components keeps the robot on the line.
         line = line / max(1.0, *(np.abs(line) / config.speed[:2]))

@@ -181,13 +181,7 @@ class LocalController:
     def follow(
         self, pose: PlanarPose, way: Way, goal: PlanarPose, footprint: Footprint, around: Around
     ) -> Twist | None:
-        """Return the best twist, or one out of the way of people; None where each leads into an obstacle.
-
-        Args:
-            pose: of base_link in the frame of the map.
-            way: where to go.
-            goal: where that ends.
-        """
+        """Return the best twist at `pose` in the map, or one out of people's way; None if all end in obstacles."""
         i, _ = way.nearest(pose)
         left = way.left(i)
         ahead = way.ahead(i, self.config.look)

@@ -65,8 +65,7 @@ class MapPicture:
 
     def rgb(self) -> NDArray[np.uint8]:
         """Return the picture, (height, width, 3)."""
-        turned = cv2.rotate(self._image, cv2.ROTATE_90_COUNTERCLOCKWISE)[:, ::-1]
-        picture = np.ascontiguousarray(turned, np.uint8)
+        picture = np.ascontiguousarray(cv2.rotate(self._image, cv2.ROTATE_90_COUNTERCLOCKWISE)[:, ::-1], np.uint8)
         height, width = picture.shape[:2]
         taken: list[Box] = []
         drawn: list[tuple[tuple[int, int], tuple[int, int], str, Colour]] = []

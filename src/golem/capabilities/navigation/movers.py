@@ -81,13 +81,7 @@ class Movers:
         self._blobs: list[_Blob] = []
 
     def update(self, t: float, points: Array, here: tuple[float, float]) -> None:
-        """Take a scan.
-
-        Args:
-            t: its time [s].
-            points: (n, 2) what it hit at the heights of a person [m].
-            here: where the robot is [m].
-        """
+        """Take a scan of time `t` [s] with `points` (n, 2) at heights of a person [m]; the robot is `here` [m]."""
         self._blobs = [blob for blob in self._blobs if 0.0 < t - blob.places[-1][0] < LOST]
         free = list(self._blobs)
         near = points[((points - here) ** 2).sum(axis=1) < REACH**2]
@@ -119,11 +113,7 @@ class Movers:
 
 
 def _velocity(rows: Array) -> Array:
-    """Return the (2,) velocity of what walks [m/s]; zero where something only shows another part of itself.
-
-    Args:
-        rows: (n, 5) time, lowest and highest x, y; see `_Blob.places`.
-    """
+    """Return the (2,) velocity of what `rows` of `_Blob.places` show [m/s]; zero where only another part was seen."""
     t = rows[:, 0] - rows[:, 0].mean()
     spread = float(t @ t)
     slopes = (t @ rows[:, 1:] / spread).reshape(2, 2)

@@ -74,10 +74,9 @@ class Nav2Config:
 
 
 class Nav2:
-    """See `Navigator`.
+    """Leaves the way to Nav2, and corrects where the robot stands at its end; see `Navigator`.
 
     Attributes:
-        rate: steps per second [Hz].
         latency: none: Nav2 takes what it takes.
     """
 
@@ -86,11 +85,7 @@ class Nav2:
     latency = 0.0
 
     def __init__(self, config: Nav2Config | None = None, nav2: Nav2Link | None = None) -> None:
-        """Speak through `nav2`, which the stack supplies.
-
-        Raises:
-            ConfigError: nobody supplied it.
-        """
+        """Speak through `nav2`, which the stack supplies. Raises ConfigError: nobody supplied it."""
         if nav2 is None:
             raise ConfigError("The navigator nav2 is made by a stack, which connects it with Nav2.")
         self.config, self._nav2 = config or Nav2Config(), nav2

@@ -58,13 +58,7 @@ class Surroundings:
         self.new = np.zeros((0, 2))
 
     def update(self, grid: OccupancyGrid, scan: Scan | None, pose: PlanarPose, radius: float) -> None:
-        """Take what is known now.
-
-        Args:
-            scan: the newest scan; None if there is none that counts.
-            pose: where the robot is.
-            radius: within which of an obstacle no way leads [m].
-        """
+        """Take the newest scan, None for none that counts; no way leads within `radius` [m] of an obstacle."""
         if self._grid is not grid:
             self._grid = grid
             self.costmap = Costmap(grid, np.zeros((0, 2)), radius, self._config)

@@ -12,11 +12,10 @@ iterated update of Xu and Zhang, FAST-LIO (RA-L 2021), in information form.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from golem.capabilities.odometry.still_start import Beginning
 from golem.kernels import njit
 from golem.types import GRAVITY, Array
 
@@ -48,6 +47,30 @@ class ImuNoise:
     yaw: float = 0.035
 
 
+@dataclass(frozen=True, slots=True)
+class Beginning:
+    """Where an inertial odometry begins, and how well that is known.
+
+    Attributes:
+        R: (3, 3) rotation of the IMU's axes in a level frame in which base_link heads along x.
+        p: (3,) place of the IMU in it; base_link is at the origin [m].
+        gyro_bias: (3,) [rad/s].
+        force: mean specific force, of a robot at rest that of gravity [m/s^2].
+        velocity: (3,) of the IMU [m/s].
+        speed, tilt, bias: standard deviations per axis of the velocity [m/s], of gravity's x and y [m/s^2], and of the
+            gyro's bias [rad/s]; None: that of the filter.
+    """
+
+    R: Array
+    p: Array
+    gyro_bias: Array
+    force: float = GRAVITY
+    velocity: Array = field(default_factory=lambda: np.zeros(3))
+    speed: float = 0.01
+    tilt: float | None = None
+    bias: float | None = None
+
+
 class ErrorState:
     """State and covariance at one time.
 
@@ -59,13 +82,7 @@ class ErrorState:
     """
 
     def __init__(self, t: float, begin: Beginning, yaw: float, noise: ImuNoise) -> None:
-        """Start.
-
-        Args:
-            t: time [s].
-            begin: where, and how.
-            yaw: of the sensor [rad].
-        """
+        """Start at time `t` [s] as `begin` says, with the sensor at a heading of `yaw` [rad]."""
         self.t, self.R, self.noise = t, begin.R.copy(), noise
         self.x: Array = np.concatenate([begin.p, begin.velocity, begin.gyro_bias, np.zeros(5), [yaw]])
         tilt, bias = begin.tilt or noise.acc_bias, begin.bias or noise.gyro_bias
@@ -116,16 +133,13 @@ class ErrorState:
         return np.array([[0.0, -1.0], [1.0, 0.0], [0.0, 0.0]]) / GRAVITY
 
     def update_velocity(self, measured: Array, R_base_imu: Array, arm: Array, deviation: float) -> bool:
-        """Take in a velocity of the base.
+        """Take in a velocity of the base; return whether it was believed: not where it is off by over 5 deviations.
 
         Args:
             measured: (3,) velocity of a point of the base, in the base's axes [m/s].
             R_base_imu: (3, 3) nominal rotation of the IMU's axes in the base's.
             arm: (3,) that point in the IMU's frame [m].
             deviation: standard deviation per axis [m/s].
-
-        Returns:
-            Whether it was believed: it is not where it is off by more than 5 deviations.
         """
         own, M = self.R.T @ self.v, about_z(self.yaw) @ R_base_imu
         told = M @ (own + cross(self.rate(), arm))

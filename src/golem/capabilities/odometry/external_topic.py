@@ -52,11 +52,7 @@ class ExternalTopic(Ignores):
     sources: tuple[Source, ...] = ("external",)
 
     def __init__(self, config: ExternalTopicConfig | None = None) -> None:
-        """Wait for the first message.
-
-        Raises:
-            ConfigError: `child` is none of `CHILDREN`.
-        """
+        """Wait for the first message. Raises ConfigError: `child` is none of `CHILDREN`."""
         self.config = config or ExternalTopicConfig()
         if self.config.child not in CHILDREN:
             raise ConfigError(
@@ -65,7 +61,6 @@ class ExternalTopic(Ignores):
         self.reset()
 
     def reset(self) -> None:
-        """Forget everything; see `LidarOdometry`."""
         self._origin = OdomOrigin()
         self._T_level_frame: Array | None = None
         self._waist, self._now = 0.0, -np.inf
@@ -89,7 +84,6 @@ class ExternalTopic(Ignores):
             self._waist, self._now = legs.waist, legs.t
 
     def add_external(self, odometry: ExternalOdometry) -> None:
-        """Take a message; see `LidarOdometry`."""
         numbers = (odometry.T_frame_child.ravel(), odometry.velocity, odometry.rate, [odometry.t])
         if not np.isfinite(np.concatenate(numbers)).all():
             return
@@ -116,7 +110,6 @@ class ExternalTopic(Ignores):
         )
 
     def estimate(self) -> OdometryEstimate | None:
-        """Return where the robot is; see `LidarOdometry`."""
         return None if self.why else self._newest
 
     def _impossible(self, odometry: ExternalOdometry, T: Array) -> str:

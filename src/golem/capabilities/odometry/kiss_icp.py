@@ -7,7 +7,7 @@ from typing import Any
 
 from golem.capabilities.odometry.base import Source, lidar_in_base
 from golem.capabilities.odometry.scan_poses import ScanPoses
-from golem.errors import MissingExtra
+from golem.errors import needs
 from golem.interfaces.lidar import LidarScan
 
 
@@ -32,21 +32,15 @@ class KissIcp(ScanPoses):
     sources: tuple[Source, ...] = ("scan",)
 
     def __init__(self, config: KissIcpConfig | None = None) -> None:
-        """Wait for the first scan.
-
-        Raises:
-            MissingExtra: the package is not installed.
-        """
+        """Wait for the first scan. Raises MissingExtra: the package is not installed."""
         self.config = config or KissIcpConfig()
         self.reset()
 
     def reset(self) -> None:
-        """Forget everything; see `LidarOdometry`."""
         self.start()
         self._icp = _icp(self.config)
 
     def add_scan(self, scan: LidarScan) -> None:
-        """Take one scan; see `LidarOdometry`."""
         taken = self.take(scan)
         if taken is None:
             return
@@ -59,12 +53,10 @@ class KissIcp(ScanPoses):
 
 
 def _icp(config: KissIcpConfig) -> Any:
-    try:
+    with needs("kiss-icp", "lidar"):
         from kiss_icp.config import KISSConfig
         from kiss_icp.config.config import DataConfig, MappingConfig, RegistrationConfig
         from kiss_icp.kiss_icp import KissICP
-    except ModuleNotFoundError as error:
-        raise MissingExtra("kiss-icp", "lidar") from error
     return KissICP(
         KISSConfig(
             data=DataConfig(max_range=config.far),

@@ -17,13 +17,11 @@ class Legs(Ignores):
         self.reset()
 
     def reset(self) -> None:
-        """Forget everything; see `LidarOdometry`."""
         self._origin = OdomOrigin()
         self._newest: OdometryEstimate | None = None
         self.why = "The legs have not reported yet."
 
     def add_legs(self, legs: LegOdometry) -> None:
-        """Take what the legs say; see `LidarOdometry`."""
         numbers = np.concatenate([legs.T_odom_base.ravel(), legs.velocity, legs.rate, [legs.t, legs.waist]])
         if not np.isfinite(numbers).all() or (self._newest is not None and legs.t <= self._newest.t):
             return
@@ -37,5 +35,4 @@ class Legs(Ignores):
         self.why = ""
 
     def estimate(self) -> OdometryEstimate | None:
-        """Return where the robot is; see `LidarOdometry`."""
         return self._newest

@@ -16,10 +16,9 @@ from numpy.typing import NDArray
 from golem.capabilities.odometry import plane_map
 from golem.capabilities.odometry.base import BLIND, BODY, Ignores, OdometryEstimate, Source, lidar_in_base, of_the_world
 from golem.capabilities.odometry.error_state import GRAVITY_XY, SIZE, YAW, ErrorState, ImuNoise, about_z, cross, deskew
-from golem.capabilities.odometry.moving_start import MovingStart
 from golem.capabilities.odometry.plane_map import PlaneMap
 from golem.capabilities.odometry.sensor_agreement import SensorAgreement, up_in_base
-from golem.capabilities.odometry.still_start import StillStart
+from golem.capabilities.odometry.still_start import MovingStart, StillStart
 from golem.interfaces.lidar import LegOdometry, LidarImu, LidarScan
 from golem.robots.sensors.mid360 import P_LIDAR_IMU
 from golem.types import Array
@@ -106,7 +105,6 @@ class Lio(Ignores):
         self.reset()
 
     def reset(self) -> None:
-        """Forget everything; see `LidarOdometry`."""
         self.map = PlaneMap()
         self.degenerate: Array = np.zeros(3)
         self.matched = 1.0
@@ -126,7 +124,6 @@ class Lio(Ignores):
         self._birth = 0.0
 
     def add_imu(self, sample: LidarImu) -> None:
-        """Take one sample of the IMU; see `LidarOdometry`."""
         if not all(map(math.isfinite, [*sample.gyro.tolist(), *sample.acc.tolist(), sample.t])):
             return
         if self._ahead is None:
@@ -145,7 +142,6 @@ class Lio(Ignores):
         self._judge(self._ahead)
 
     def add_legs(self, legs: LegOdometry) -> None:
-        """Take what the legs say; see `LidarOdometry`."""
         if not all(map(math.isfinite, [*legs.velocity.tolist(), legs.waist])):
             return
         self._waist, self._legs = legs.waist, legs
@@ -159,7 +155,6 @@ class Lio(Ignores):
         self._agree.velocity(self._walk(self._ahead, legs))
 
     def add_scan(self, scan: LidarScan) -> None:
-        """Take one scan; see `LidarOdometry`."""
         state = self._filter
         if state is None or self._ahead is None or not math.isfinite(scan.t):
             return
@@ -169,8 +164,7 @@ class Lio(Ignores):
         start = scan.t - scan.duration
         if not self._agree.scan(scan, self._ahead.t) or start < state.t - 1e-3:
             return  # of another clock or sensor, before the start, or out of order
-        track = self._advance(state, scan.t, start)
-        local = self._points(scan, start, track)
+        local = self._points(scan, start, self._advance(state, scan.t, start))
         if len(local):
             self._update(state, local)
         self._ahead = state.copy()
@@ -198,7 +192,6 @@ class Lio(Ignores):
         return "" if self._fits >= self.config.found_after else "The scans do not fit the map."
 
     def estimate(self) -> OdometryEstimate | None:
-        """Return where the robot is; see `LidarOdometry`."""
         state = self._ahead
         if state is None or self.why:
             return None

@@ -39,16 +39,10 @@ class PlaneMap:
         self._used: NDArray[np.int64] = np.zeros(len(SIZES), dtype=np.int64)
 
     def __len__(self) -> int:
-        """Return the number of voxels."""
         return int(self._used.sum())
 
     def insert(self, points: Array, birth: float) -> None:
-        """Add points.
-
-        Args:
-            points: (n, 3) in the map's frame [m].
-            birth: variance of the place from which they were seen, per axis [m^2].
-        """
+        """Add (n, 3) points in the map's frame [m]; `birth` is the variance of the place seen from, per axis [m^2]."""
         while self._used.max() + len(points) > 0.7 * self.keys.shape[1]:
             self._grow()
         _insert(points, birth, self.keys, self.cells, self._used, np.array(SIZES))

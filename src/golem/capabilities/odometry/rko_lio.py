@@ -11,7 +11,7 @@ import numpy as np
 from golem.capabilities.odometry.base import Source
 from golem.capabilities.odometry.scan_poses import ScanPoses
 from golem.capabilities.odometry.still_start import StillStart
-from golem.errors import MissingExtra
+from golem.errors import needs
 from golem.interfaces.lidar import LidarImu, LidarScan
 from golem.robots.model.spatial import transform
 from golem.robots.sensors.mid360 import P_LIDAR_IMU
@@ -51,23 +51,17 @@ class RkoLio(ScanPoses):
     sources: tuple[Source, ...] = ("imu", "scan")
 
     def __init__(self, config: RkoLioConfig | None = None) -> None:
-        """Wait for IMU and scans.
-
-        Raises:
-            MissingExtra: the package is not installed.
-        """
+        """Wait for IMU and scans. Raises MissingExtra: the package is not installed."""
         self.config = config or RkoLioConfig()
         self.reset()
 
     def reset(self) -> None:
-        """Forget everything; see `LidarOdometry`."""
         self.start()
         self._lio = _lio(self.config)
         self._still = StillStart()
         self._imu_t, self._begun, self._scans = -math.inf, math.inf, 0
 
     def add_imu(self, sample: LidarImu) -> None:
-        """Take one sample of the IMU; see `LidarOdometry`."""
         finite = np.isfinite(sample.gyro).all() and np.isfinite(sample.acc).all() and math.isfinite(sample.t)
         if not finite or sample.t <= self._imu_t:
             return
@@ -79,7 +73,6 @@ class RkoLio(ScanPoses):
         self._lio.add_imu_measurement(sample.acc, sample.gyro, _ns(sample.t), np.eye(4))
 
     def add_scan(self, scan: LidarScan) -> None:
-        """Take one scan; see `LidarOdometry`."""
         if scan.t - scan.duration < self._begun or scan.t > self._imu_t + IMU_LAG:
             return  # before the start, of another clock, or there is no IMU
         taken = self.take(scan)
@@ -107,11 +100,9 @@ def _ns(t: float) -> int:
 
 
 def _lio(config: RkoLioConfig) -> Any:
-    try:
+    with needs("rko-lio", "lidar"):
         from rko_lio.config import LIOConfig
         from rko_lio.lio import LIO
-    except ModuleNotFoundError as error:
-        raise MissingExtra("rko-lio", "lidar") from error
     return LIO(
         LIOConfig(
             voxel_size=config.voxel,

@@ -7,14 +7,7 @@ import math
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from golem.capabilities.odometry.base import (
-    NO_COVARIANCE,
-    Ignores,
-    OdometryEstimate,
-    OdomOrigin,
-    lidar_in_base,
-    of_the_world,
-)
+from golem.capabilities.odometry import base
 from golem.interfaces.lidar import LegOdometry, LidarScan
 from golem.types import Array
 
@@ -24,7 +17,7 @@ LOST_AFTER = 1.0
 """Time between two scans from which on the later one may have been matched wrongly [s]."""
 
 
-class ScanPoses(Ignores):
+class ScanPoses(base.Ignores):
     """An odometry that says one pose per scan: of its end. Between scans it stays what it was.
 
     A subclass registers scans; see `LidarOdometry` for the rest.
@@ -34,9 +27,9 @@ class ScanPoses(Ignores):
 
     def start(self) -> None:
         """Begin anew."""
-        self._origin = OdomOrigin()
+        self._origin = base.OdomOrigin()
         self._waist = 0.0
-        self._newest: OdometryEstimate | None = None
+        self._newest: base.OdometryEstimate | None = None
         self._ended = -math.inf
         self.why = "No scan has come yet."
 
@@ -45,7 +38,7 @@ class ScanPoses(Ignores):
         if math.isfinite(legs.waist):
             self._waist = legs.waist
 
-    def estimate(self) -> OdometryEstimate | None:
+    def estimate(self) -> base.OdometryEstimate | None:
         """Return where the robot was at the end of the newest scan; see `LidarOdometry`."""
         return self._newest
 
@@ -56,7 +49,7 @@ class ScanPoses(Ignores):
             return None
         points = scan.points.astype(np.float64)
         offsets = scan.offsets.astype(np.float64)
-        good = of_the_world(points, lidar_in_base(self._waist)) & np.isfinite(offsets)
+        good = base.of_the_world(points, base.lidar_in_base(self._waist)) & np.isfinite(offsets)
         if good.sum() < FEWEST:
             self._lose(f"The scan of {scan.t:.1f} s has fewer than {FEWEST} points of the world.")
             return None
@@ -67,7 +60,7 @@ class ScanPoses(Ignores):
         if not np.isfinite(T_own_lidar).all():
             self._lose(f"The scan of {t:.1f} s could not be registered.")
             return
-        T_base_lidar = lidar_in_base(self._waist)
+        T_base_lidar = base.lidar_in_base(self._waist)
         T = self._origin(T_own_lidar @ np.linalg.inv(T_base_lidar))
         velocity, rate = np.zeros(3), np.zeros(3)
         if self._newest is not None and t - self._ended < LOST_AFTER:
@@ -75,7 +68,7 @@ class ScanPoses(Ignores):
             velocity = (T[:3, 3] - self._newest.T_odom_base[:3, 3]) / (t - self._ended)
             rate = Rotation.from_matrix(step[:3, :3]).as_rotvec() / (t - self._ended)
         self._newest, self._ended, self.why = (
-            OdometryEstimate(t, T, velocity, rate, NO_COVARIANCE, T_base_lidar),
+            base.OdometryEstimate(t, T, velocity, rate, base.NO_COVARIANCE, T_base_lidar),
             t,
             "",
         )

@@ -26,11 +26,7 @@ SCANS, SAMPLES, VELOCITIES = 5, 40, 20
 
 
 class SensorAgreement:
-    """Compares what the sensors say with each other.
-
-    Attributes:
-        why: one sentence that says what cannot be; empty where all can.
-    """
+    """Compares what the sensors say with each other; `why` says what cannot be, empty where all can."""
 
     def __init__(self) -> None:
         self.why = ""

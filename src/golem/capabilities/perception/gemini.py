@@ -44,18 +44,10 @@ class GeminiConfig(GeminiServiceConfig):
 
 
 class Gemini:
-    """Objects of any name, by one question per frame; see `Localizer`. What it answers may differ from day to day.
-
-    Attributes:
-        latency: declared time per frame [s].
-    """
+    """Objects of any name, by one question per frame; see `Localizer`. What it answers may differ from day to day."""
 
     def __init__(self, config: GeminiConfig | None = None, sleep: Callable[[float], None] = time.sleep) -> None:
-        """Take the key from the environment.
-
-        Raises:
-            ConfigError: there is none.
-        """
+        """Take the key from the environment. Raises ConfigError: there is none."""
         self.config = config or GeminiConfig()
         self.latency = self.config.latency
         self._service = GeminiService(self.config, "The localizer gemini", "choose another localizer", sleep)

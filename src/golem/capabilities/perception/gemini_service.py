@@ -61,11 +61,7 @@ class GeminiServiceConfig:
 
 
 class GeminiService:
-    """Asks the model. What it answers may differ from day to day.
-
-    Attributes:
-        asked: questions asked so far.
-    """
+    """Asks the model, `asked` times so far. What it answers may differ from day to day."""
 
     def __init__(
         self, config: GeminiServiceConfig, who: str, instead: str, sleep: Callable[[float], None] = time.sleep
@@ -156,11 +152,7 @@ def to_jpeg(rgb: NDArray[np.uint8]) -> bytes:
 
 
 def read_json(text: str) -> Any:
-    """Return what the model's words hold: JSON, bare or fenced; an empty list where there are none.
-
-    Raises:
-        ServiceUnavailable: they hold no JSON.
-    """
+    """Return the JSON of the model's words, bare or fenced, else an empty list. Raises ServiceUnavailable: not JSON."""
     fenced = re.search(r"```(?:json)?\s*(.*?)```", text, re.S)
     bare = (fenced.group(1) if fenced else text).strip()
     try:
@@ -172,8 +164,7 @@ def read_json(text: str) -> Any:
 def _words(raw: bytes) -> str:
     """Return the text of an answer of the service."""
     try:
-        answer = json.loads(raw)
-        parts = answer["candidates"][0]["content"]["parts"]
+        parts = json.loads(raw)["candidates"][0]["content"]["parts"]
         return "".join(part.get("text", "") for part in parts)
     except (ValueError, KeyError, IndexError, TypeError, AttributeError) as error:
         blocked = re.search(rb'"(?:blockReason|finishReason)"\s*:\s*"(\w+)"', raw)

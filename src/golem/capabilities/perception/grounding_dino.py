@@ -18,18 +18,13 @@ class GroundingDino(OpenWords):
     """
 
     def __init__(self, config: OpenWordsConfig) -> None:
-        """Load network and processor.
-
-        Raises:
-            MissingExtra, ConfigError: see `load_model`.
-        """
+        """Load network and processor. Raises MissingExtra, ConfigError: see `load_model`."""
         super().__init__(config)
         self._network, self._processor = load_model(
             config.weights, "grounding-dino", "GroundingDinoForObjectDetection", "GroundingDinoProcessor"
         )
 
     def answer(self, image: NDArray[np.uint8], words: Sequence[str]) -> list[tuple[int, float, Any]]:
-        """Return the boxes; see `OpenWords`."""
         import torch
 
         rows: list[tuple[int, float, Any]] = []

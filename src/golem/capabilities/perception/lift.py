@@ -73,8 +73,7 @@ def surface_depth(depths: NDArray[np.float32], config: LiftConfig, *, flush: boo
     if flush:
         start = int(np.argmax(counts))
     else:
-        enough = counts >= max(config.near_share * len(valid), config.min_valid / 2)
-        first = int(np.argmax(enough))
+        first = int(np.argmax(counts >= max(config.near_share * len(valid), config.min_valid / 2)))
         # Slide to the densest place of this nearest mode: the first qualifying window may hold only its front edge.
         reach = int(np.searchsorted(valid, valid[first] + width, side="right"))
         start = first + int(np.argmax(counts[first:reach]))
@@ -167,8 +166,26 @@ def lift_boxes(frame: RgbdImage, boxes: Iterable[Box], config: LiftConfig) -> li
         corners = np.clip(np.asarray(box.corners, np.float64), 0.0, most)
         if not np.isfinite(corners).all() or (corners[2:] - corners[:2] < 1.0).any():
             continue
-        detection = Detection(box.label, box.score, corners, 0.5 * (corners[:2] + corners[2:]))
-        lifted = lift(frame, detection, config)
+        lifted = lift(frame, Detection(box.label, box.score, corners, 0.5 * (corners[:2] + corners[2:])), config)
         if lifted is not None:
             found.append(lifted)
     return found
+
+
+def standing_middle(points: Array, eye: Array) -> Array:
+    """Return (2,) the middle of the plan of what stands upright and is about as deep as wide, such as a can [m].
+
+    A camera shows the near side, and of what it looks down on the top, too. Half of the width behind the nearest point
+    is the middle of both, unless more, or not as much, of the depth is seen.
+
+    Args:
+        points: (n, 3) what is seen of it, n >= 1, z up [m].
+        eye: (2,) or (3,) where the camera is [m].
+    """
+    ahead = np.median(points[:, :2], axis=0) - eye[:2]
+    ahead /= max(float(np.hypot(*ahead)), 1e-9)
+    axes = np.array([ahead, (-ahead[1], ahead[0])])
+    low, high = np.quantile(points[:, :2] @ axes.T, (0.02, 0.98), axis=0)
+    deep, wide = high - low
+    along = low[0] + min(max(0.5 * wide, 0.5 * deep), deep)
+    return np.array([along, 0.5 * (low[1] + high[1])]) @ axes

@@ -43,11 +43,7 @@ class OnnxDetector:
     """Parts of a pack, and what stands in a kitchen, in images of any size; deterministic."""
 
     def __init__(self, config: OnnxDetectorConfig | None = None) -> None:
-        """Load the network.
-
-        Raises:
-            ConfigError: the file is absent or no such network, or the threshold is not between 0 and 1.
-        """
+        """Load the network. Raises ConfigError: it is none of ours, or the threshold is not between 0 and 1."""
         self.config = config or OnnxDetectorConfig()
         self.latency = self.config.latency
         if not 0.0 < self.config.threshold < 1.0:

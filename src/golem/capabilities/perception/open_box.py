@@ -105,8 +105,7 @@ def fit_open_box(sighting: LocalizedObject) -> OpenBox | None:
     index = ((walls[:, :2] - low) / CELL).astype(np.int32)
     cells = np.zeros(index.max(axis=0) + 3, np.uint8)
     cells[index[:, 0], index[:, 1]] = 1
-    joined = cv2.dilate(cells, np.ones((3, 3), np.uint8))
-    _, labels = cv2.connectedComponents(joined, connectivity=8)
+    _, labels = cv2.connectedComponents(cv2.dilate(cells, np.ones((3, 3), np.uint8)), connectivity=8)
     here = labels[index[:, 0], index[:, 1]]
     candidates = [walls[here == label, :2] for label in range(1, int(labels.max()) + 1)]
     around = [p for p in candidates if (p.min(axis=0) < middle[:2]).all() and (p.max(axis=0) > middle[:2]).all()]

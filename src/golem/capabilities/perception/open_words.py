@@ -27,7 +27,6 @@ def load_model(folder: Path, kind: str, model: str, processor: str) -> tuple[Any
         folder: as `save_pretrained` writes it: configuration, weights, tokenizer and preprocessor.
         kind: `model_type` that the configuration has to have.
         model: name of the network's class in `transformers`.
-        processor: name of the processor's class.
 
     Raises:
         MissingExtra: transformers or torch is not installed.
@@ -66,11 +65,7 @@ class Sam:
     """Masks for boxes."""
 
     def __init__(self, folder: Path) -> None:
-        """Load network and processor.
-
-        Raises:
-            MissingExtra, ConfigError: see `load_model`.
-        """
+        """Load network and processor. Raises MissingExtra, ConfigError: see `load_model`."""
         self._network, self._processor = load_model(folder, "sam", "SamModel", "SamProcessor")
 
     def masked(self, frame: RgbdImage, objects: Sequence[LocalizedObject]) -> list[LocalizedObject]:
@@ -139,36 +134,19 @@ class OpenWordsConfig:
 
 
 class OpenWords(ABC):
-    """A detector that takes any words; see `Localizer`.
-
-    Attributes:
-        latency: declared time per frame [s].
-    """
+    """A detector that takes any words; see `Localizer`."""
 
     def __init__(self, config: OpenWordsConfig) -> None:
-        """Load the masks' network, where there is one.
-
-        Raises:
-            MissingExtra, ConfigError: see `load_model`.
-        """
+        """Load the masks' network, where there is one. Raises MissingExtra, ConfigError: see `load_model`."""
         self.config, self.latency = config, config.latency
         self._sam = None if config.sam is None else Sam(config.sam)
 
     @abstractmethod
     def answer(self, image: NDArray[np.uint8], words: Sequence[str]) -> list[tuple[int, float, Any]]:
-        """Return (number of the words, score, (4,) x_min, y_min, x_max, y_max [px]) of each box in an image.
-
-        Args:
-            image: (height, width, 3) RGB.
-            words: what is looked for.
-        """
+        """Return (number of the words, score, (4,) x_min, y_min, x_max, y_max [px]) of each box in an RGB image."""
 
     def boxes(self, image: NDArray[np.uint8], labels: Sequence[str]) -> list[Box]:
-        """Return the boxes of `labels` in an image, (height, width, 3) RGB, best first.
-
-        Raises:
-            ConfigError: a label is empty.
-        """
+        """Return the boxes of `labels` in a (height, width, 3) RGB, best first. Raises ConfigError: one is empty."""
         asked = list(dict.fromkeys(labels))
         words = [self.config.words.get(label, label.replace("_", " ")).strip() for label in asked]
         if not all(words):
@@ -187,6 +165,5 @@ class OpenWords(ABC):
         return sorted(kept, key=lambda box: -box.score)
 
     def locate(self, frame: RgbdImage, labels: Sequence[str]) -> list[LocalizedObject]:
-        """Return what is seen of `labels`, any words; see `Localizer`."""
         objects = lift_boxes(frame, self.boxes(frame.rgb, labels), self.config.lift)
         return objects if self._sam is None else self._sam.masked(frame, objects)

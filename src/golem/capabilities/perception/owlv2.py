@@ -15,18 +15,13 @@ class Owlv2(OpenWords):
     """Boxes for any words; see `Localizer`."""
 
     def __init__(self, config: OpenWordsConfig) -> None:
-        """Load network and processor.
-
-        Raises:
-            MissingExtra, ConfigError: see `load_model`.
-        """
+        """Load network and processor. Raises MissingExtra, ConfigError: see `load_model`."""
         super().__init__(config)
         self._network, self._processor = load_model(
             config.weights, "owlv2", "Owlv2ForObjectDetection", "Owlv2Processor"
         )
 
     def answer(self, image: NDArray[np.uint8], words: Sequence[str]) -> list[tuple[int, float, Any]]:
-        """Return the boxes; see `OpenWords`."""
         import torch
 
         given = self._processor(

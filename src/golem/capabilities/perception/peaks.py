@@ -16,16 +16,13 @@ SAME_SHARE = 0.35
 
 
 def normalise(image: NDArray[np.uint8], mean: Array, std: Array, multiple: int) -> NDArray[np.float32]:
-    """Return an image as the network takes it.
+    """Return an image as the network takes it, (1, 3, padded height, padded width).
 
     Args:
         image: (height, width, 3) RGB.
         mean: (3,) of RGB in 0..1.
         std: (3,) of RGB in 0..1.
         multiple: the sides are padded with the mean colour, right and below, to multiples of this.
-
-    Returns:
-        (1, 3, padded height, padded width).
     """
     height, width = image.shape[:2]
     padded = np.zeros((1, 3, -(-height // multiple) * multiple, -(-width // multiple) * multiple), np.float32)

@@ -56,19 +56,10 @@ class YoloWorldConfig:
 
 
 class YoloWorld:
-    """The classes that the user's export knows; see `Localizer`.
-
-    Attributes:
-        classes: labels, in the order of the network's.
-        latency: declared time per frame [s].
-    """
+    """The `classes` that the user's export knows, in the order of the network's; see `Localizer`."""
 
     def __init__(self, config: YoloWorldConfig) -> None:
-        """Load the network.
-
-        Raises:
-            ConfigError: the file is absent, no network, no such export, or cannot be run.
-        """
+        """Load the network. Raises ConfigError: the file is absent, no network, no such export, or cannot be run."""
         self.config = config
         self.latency = config.latency
         options = onnxruntime.SessionOptions()
@@ -98,11 +89,7 @@ class YoloWorld:
         self.boxes(np.full((*self._size, 3), GREY, np.uint8))  # what cannot run, or answers otherwise, is found now
 
     def boxes(self, image: NDArray[np.uint8]) -> list[Box]:
-        """Return all boxes in an image, (height, width, 3) RGB, best first.
-
-        Raises:
-            ConfigError: the network's answer has another shape than such an export's.
-        """
+        """Return all boxes in (height, width, 3) RGB, best first. Raises ConfigError: the answer has another shape."""
         x, scale, shift = letterbox(image, self._size)
         try:
             answer = np.asarray(self._session.run(self._outputs, {self._name: x})[0], np.float64)
@@ -122,7 +109,6 @@ class YoloWorld:
         return sorted(found, key=lambda box: -box.score)
 
     def locate(self, frame: RgbdImage, labels: Sequence[str]) -> list[LocalizedObject]:
-        """Return what is seen of `labels`; see `Localizer`."""
         for label in labels:
             if label not in self.classes:
                 raise unknown_name("label", label, self.classes)
@@ -165,14 +151,11 @@ class YoloWorld:
 
 
 def letterbox(image: NDArray[np.uint8], size: tuple[int, int]) -> tuple[NDArray[np.float32], float, Array]:
-    """Return an image scaled into the middle of a grey one.
+    """Return an image in a grey one, (1, 3, height, width) from 0 to 1, the scale, and the shift (2,) of x, y [px].
 
     Args:
         image: (h, w, 3) RGB.
         size: height and width that the network takes [px].
-
-    Returns:
-        (1, 3, height, width) from 0 to 1, the scale, and (2,) the shift of x and y [px].
     """
     height, width = image.shape[:2]
     scale = min(size[0] / height, size[1] / width)
@@ -191,8 +174,7 @@ def distinct(corners: Array, scores: Array, overlap: float) -> list[int]:
     kept: list[int] = []
     for k in order.tolist():
         low = np.maximum(corners[kept, :2], corners[k, :2])
-        high = np.minimum(corners[kept, 2:], corners[k, 2:])
-        shared = np.prod(np.maximum(high - low, 0.0), axis=1)
+        shared = np.prod(np.maximum(np.minimum(corners[kept, 2:], corners[k, 2:]) - low, 0.0), axis=1)
         if not len(kept) or (shared <= overlap * (area[kept] + area[k] - shared)).all():
             kept.append(k)
     return kept

@@ -37,11 +37,7 @@ class PlanningRobot:
     """
 
     def __init__(self, robot: SphereRobot | None = None) -> None:
-        """Lay out the tables.
-
-        Args:
-            robot: the spheres; by default those of the H1-2 with MAGPIE hands.
-        """
+        """Lay out the tables of `robot`, by default the H1-2 with MAGPIE hands."""
         self._robot = robot or shipped_spheres()
         self._models: dict[tuple[tuple[Side, bytes], ...], CollisionModel] = {}
         gate = SafetyLimits.from_profile()
@@ -87,12 +83,7 @@ class PlanningRobot:
 
 
 class JointSpace:
-    """The postures that one request allows.
-
-    Attributes:
-        space: as the kernel reads it.
-        rules: those of the request.
-    """
+    """The postures that one request allows by its `rules`; `space` is what the kernel reads."""
 
     def __init__(
         self,

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from golem.capabilities.arms.trajectory import interpolate
 from golem.capabilities.planning import plan_kernel
 from golem.capabilities.planning.base import NUM_JOINTS, Plan, PlanRefused, PlanRequest, Refusal, check_request
-from golem.capabilities.planning.hermite import interpolate
 from golem.capabilities.planning.joint_space import JointSpace, PlanningRobot
 from golem.errors import ConfigError
 from golem.types import Array
@@ -90,7 +90,6 @@ def time_path(points: Array, limits: MotionLimits, hands: Array) -> tuple[Array,
 
     Args:
         points: no two neighbours alike.
-        limits: what is kept.
         hands: (m, k, 3) where the hands are at each point [m].
     """
     steps = np.diff(points, axis=0)
@@ -108,8 +107,7 @@ def time_path(points: Array, limits: MotionLimits, hands: Array) -> tuple[Array,
         fastest = SLACK * limits.hand_speed / moved
     cap = np.minimum(cap, np.minimum(np.r_[fastest, np.inf], np.r_[np.inf, fastest]))
     v = plan_kernel.speeds_along(cap, lengths, tangents, (1.0 - CURVED) * limits.accel)
-    times = np.concatenate(([0.0], np.cumsum(2.0 * lengths / (v[1:] + v[:-1]))))
-    return times, at * v[:, None]
+    return np.concatenate(([0.0], np.cumsum(2.0 * lengths / (v[1:] + v[:-1])))), at * v[:, None]
 
 
 FINE = 0.01
@@ -157,12 +155,7 @@ class PathPlannerConfig:
 
 
 class Effort:
-    """Counts the postures that were looked at, and says when to give up.
-
-    Attributes:
-        used: so far.
-        left: what may still be looked at.
-    """
+    """Counts the postures that were looked at: `used` so far, and `left` until it says to give up."""
 
     def __init__(self, request: PlanRequest) -> None:
         self.used, self._most, self._stop = 0, request.effort, request.stop
@@ -173,11 +166,7 @@ class Effort:
         return self._most - self.used
 
     def spend(self, checks: int) -> None:
-        """Count `checks` more.
-
-        Raises:
-            PlanRefused: the caller has given up.
-        """
+        """Count `checks` more. Raises PlanRefused: the caller has given up."""
         self.used += checks
         if self._stop():
             raise PlanRefused(Refusal.STOPPED, "The caller gave the plan up.")
@@ -187,13 +176,11 @@ class PathPlanner(ABC):
     """A planner that finds a path first and times it then; see `ArmPlanner` for the contract.
 
     Attributes:
-        latency: see `ArmPlanner`.
         robot: what of the robot does not change.
         speed, accel: (15,) limits of the joints [rad/s, rad/s^2].
     """
 
     def __init__(self, config: PathPlannerConfig | None = None) -> None:
-        """Lay out the robot's tables; compiles the kernels where they are not cached."""
         self.config = c = config or PathPlannerConfig()
         self.latency = c.latency
         self.robot = PlanningRobot()
@@ -214,12 +201,10 @@ class PathPlanner(ABC):
         """
 
     def plan(self, request: PlanRequest) -> Plan:
-        """Return a trajectory; see `ArmPlanner`."""
         q, goals = check_request(request)
         c, effort = self.config, Effort(request)
         rules, held = tuple(request.rules), tuple(request.held)
-        margins = (0.0, c.world_margin)
-        space = JointSpace(self.robot, q, request.world, rules, held, margins)
+        space = JointSpace(self.robot, q, request.world, rules, held, (0.0, c.world_margin))
         effort.spend(1)
         start = space.verdict(q)
         if start:
@@ -268,9 +253,8 @@ class PathPlanner(ABC):
 
 def fine_points(times: Array, q: Array, dq: Array) -> Array:
     """Return (m, n) postures on a trajectory, its points among them, no two neighbours farther apart than `FINE`."""
-    gaps = np.abs(np.diff(q, axis=0)).max(axis=1)
     # A cubic that sets off from rest is up to twice as fast as its mean.
-    parts = np.maximum(1, np.ceil(2.0 * gaps / FINE)).astype(int)
+    parts = np.maximum(1, np.ceil(2.0 * np.abs(np.diff(q, axis=0)).max(axis=1) / FINE)).astype(int)
     s = np.concatenate(
         [t0 + (t1 - t0) * np.arange(k) / k for t0, t1, k in zip(times, times[1:], parts, strict=False)] + [times[-1:]]
     )

@@ -32,7 +32,6 @@ def straight_line(space: JointSpace, q: Array, goals: Array, effort: Effort, ste
     Args:
         q: (15,) start.
         goals: (k, 15).
-        effort: what may be spent.
         step: between two checks [rad in a joint].
     """
     for i in np.argsort(np.abs(goals - q).max(axis=1), kind="stable"):
@@ -71,14 +70,12 @@ class RrtConnect(PathPlanner):
     """Two trees of postures, from the start and from the goals, that grow towards each other."""
 
     def __init__(self, config: RrtConnectConfig | None = None) -> None:
-        """Lay out the robot's tables; compiles the kernels where they are not cached."""
         self._options = config or RrtConnectConfig()
         super().__init__(self._options.path)
 
     def find(
         self, space: JointSpace, q: Array, goals: Array, rng: np.random.Generator, effort: Effort, attempt: int
     ) -> Array:
-        """Return the corners of a path; see `PathPlanner`."""
         # A path that just touches a rule may slip through between two checks: the next one is checked more finely.
         step = max(FINE, self._options.step * 0.5**attempt)
         line = straight_line(space, q, goals, effort, step)

@@ -16,12 +16,7 @@ PAPER_BOX = ((0.0, -0.45, -0.05), (0.60, 0.45, 0.60))
 
 @dataclass(frozen=True, slots=True)
 class HandBox:
-    """The grasp frame of a hand stays within a box.
-
-    Attributes:
-        side: which hand.
-        lower, upper: opposite corners in base_link [m].
-    """
+    """The grasp frame of a hand stays within a box, whose opposite corners in base_link are `lower`, `upper` [m]."""
 
     side: Side
     lower: tuple[float, float, float] = PAPER_BOX[0]
@@ -45,7 +40,6 @@ class HandUpright:
     """The approach axis of a hand, z, stays near a direction.
 
     Attributes:
-        side: which hand.
         angle: how far it may turn away [rad].
         axis: the direction in base_link; straight down unless said otherwise.
     """
@@ -70,11 +64,7 @@ class HandUpright:
 
 @dataclass(frozen=True, slots=True)
 class Balanced:
-    """The robot's centre of mass stays near where it is at the start, for a robot that stands on its feet.
-
-    Attributes:
-        shift: how far it may move across [m].
-    """
+    """The centre of mass of a robot on its feet stays where it is at the start, across to within `shift` [m]."""
 
     shift: float = 0.04
 

@@ -29,11 +29,7 @@ def resized(picture: NDArray[Any], size: tuple[int, int], smooth: bool = True) -
 
 
 class Observer:
-    """Looks at a bus, and has the cameras exposed.
-
-    Attributes:
-        vectors: makes vectors of an instant.
-    """
+    """Looks at a bus, and has the cameras exposed."""
 
     def __init__(
         self, bus: Bus, cameras: Sequence[str], width: int = 0, stream: Callable[[str], Topic[Any]] = topics.exposures

@@ -24,19 +24,10 @@ MEASURED = [list(STATE).index(list(ACTION)[i]) for i in POSITIONS]
 
 
 class OnnxPolicy:
-    """A network on the CPU, one thread; see `ActionPolicy`.
-
-    Attributes:
-        camera: whose pictures it wants.
-        fps: actions of a chunk per second [Hz].
-    """
+    """A network on the CPU, one thread, whose chunks have `fps` actions per second [Hz]; see `ActionPolicy`."""
 
     def __init__(self, path: Path) -> None:
-        """Load it.
-
-        Raises:
-            ConfigError: there is no such file, or it is no policy of this robot.
-        """
+        """Load it. Raises ConfigError: there is no such file, or it is no policy of this robot."""
         import onnxruntime
 
         options = onnxruntime.SessionOptions()
@@ -51,7 +42,6 @@ class OnnxPolicy:
             raise ConfigError(f"{path} is no policy of `golem train act`: {shorten(str(error))}.") from error
 
     def infer(self, observation: Mapping[str, Any]) -> Array:
-        """Return the chunk of actions (n, 25) for an observation; see `ActionPolicy`."""
         state = np.asarray(observation["observation.state"], np.float32)
         picture = np.asarray(observation[f"observation.images.{self.camera}"])
         if picture.shape[1::-1] != self._size:

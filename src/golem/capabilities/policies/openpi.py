@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from golem.errors import ConfigError, MissingExtra, ServiceUnavailable, shorten
+from golem.errors import ConfigError, ServiceUnavailable, needs, shorten
 from golem.options import require
 
 
@@ -61,18 +61,10 @@ class PolicyLinkConfig:
 
 
 class PolicyServer:
-    """One policy server; the connection is made when it is first asked, and again after a failure.
-
-    Attributes:
-        about: what it said about itself.
-    """
+    """One policy server, whose words of itself are `about`; it is connected to when asked, and after a failure."""
 
     def __init__(self, config: PolicyLinkConfig) -> None:
-        """Take the address.
-
-        Raises:
-            MissingExtra: the extra `policy` is not installed.
-        """
+        """Take the address. Raises MissingExtra: the extra `policy` is not installed."""
         _packages()
         self._config, self._socket = config, None
         self._where = f"The policy server at {config.host}:{config.port}"
@@ -163,10 +155,8 @@ def unpack_array(value: dict[Any, Any]) -> object:
 
 
 def _packages() -> tuple[Any, Any, Any]:
-    try:
+    with needs("", "policy"):
         import msgpack
         import websockets
         import websockets.sync.client
-    except ImportError as error:
-        raise MissingExtra(error.name or "websockets", "policy") from error
     return websockets, msgpack, websockets.sync.client

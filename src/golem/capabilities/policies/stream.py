@@ -24,11 +24,7 @@ class ActionPolicy(Protocol):
     """Whoever answers observations."""
 
     def infer(self, observation: Mapping[str, Any]) -> Any:
-        """Return a chunk of actions (n, 25) for an observation, see `golem.capabilities.policies.vectors`.
-
-        Raises:
-            ServiceUnavailable: there is no answer.
-        """
+        """Return a chunk of actions (n, 25) for an observation; see `vectors`. Raises ServiceUnavailable: no answer."""
         ...
 
 
@@ -46,11 +42,7 @@ def open_policy(config: C) -> tuple[PolicyServer | OnnxPolicy, C]:
 
 
 def check_near(goal: Array, pose: Array, far: float) -> None:
-    """Check that a hand at `pose` may be meant to go to `goal`, (4, 4) each, `far` away at most [m].
-
-    Raises:
-        ActionRefused: it is further.
-    """
+    """Check that a hand at `pose` may go to `goal`, (4, 4) each. Raises ActionRefused: it is over `far` [m] away."""
     away = float(np.linalg.norm(goal[:3, 3] - pose[:3, 3]))
     if away > far:
         raise ActionRefused(f"The policy sends a hand {away:.2f} m away in one step; {far:g} m is the most.")

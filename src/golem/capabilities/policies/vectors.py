@@ -152,11 +152,7 @@ def palm_pose(numbers: Array) -> Array:
 
 
 def check_actions(value: object) -> Array:
-    """Return a chunk of actions (n, 25), n >= 1; one action is a chunk, too.
-
-    Raises:
-        ActionRefused: it has another size, or is not finite.
-    """
+    """Return a chunk of actions (n, 25), of one at least. Raises ActionRefused: another size, or not finite."""
     try:
         actions = np.atleast_2d(np.asarray(value, np.float64))
     except (TypeError, ValueError) as error:

@@ -66,5 +66,4 @@ def holding_force(thing: Properties, safety: float, squeeze: float) -> float:
     Two pads with friction mu carry the weight m g where 2 mu F >= m g (Coulomb). It is multiplied by `safety`, for
     motion and for what the numbers are off by, and never more than what presses the thing together by `squeeze` [m].
     """
-    needed = safety * thing.mass * GRAVITY / (2.0 * thing.friction)
-    return min(needed, thing.stiffness * squeeze)
+    return min(safety * thing.mass * GRAVITY / (2.0 * thing.friction), thing.stiffness * squeeze)

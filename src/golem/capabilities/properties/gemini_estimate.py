@@ -25,18 +25,10 @@ class GeminiEstimateConfig(GeminiServiceConfig):
 
 
 class GeminiEstimate:
-    """Mass, friction and stiffness as a language model estimates them; see `PropertySource`.
-
-    Attributes:
-        latency: declared time of an answer [s].
-    """
+    """Mass, friction and stiffness as a language model estimates them; see `PropertySource`."""
 
     def __init__(self, config: GeminiEstimateConfig | None = None, sleep: Callable[[float], None] = time.sleep) -> None:
-        """Take the key from the environment.
-
-        Raises:
-            ConfigError: there is none.
-        """
+        """Take the key from the environment. Raises ConfigError: there is none."""
         self.config = config or GeminiEstimateConfig()
         self.latency = self.config.latency
         self._service = GeminiService(

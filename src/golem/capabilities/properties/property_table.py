@@ -24,20 +24,12 @@ class PropertyTableConfig:
 
 
 class PropertyTable:
-    """Mass, friction and stiffness by name, from a table; see `PropertySource`.
-
-    Attributes:
-        latency: none [s].
-    """
+    """Mass, friction and stiffness by name, from a table; see `PropertySource`."""
 
     latency = 0.0
 
     def __init__(self, config: PropertyTableConfig | None = None) -> None:
-        """Take the table.
-
-        Raises:
-            ConfigError: a number in it is none that a thing can have.
-        """
+        """Take the table. Raises ConfigError: a number in it is none that a thing can have."""
         self._things: dict[str, Properties] = {}
         for label, row in {**KNOWN, **(config or PropertyTableConfig()).things}.items():
             try:
@@ -46,7 +38,6 @@ class PropertyTable:
                 raise ConfigError(f"The properties of {label}: {error}.") from error
 
     def properties(self, label: str) -> Properties:
-        """Return the row of `label`; see `PropertySource`."""
         if label not in self._things:
             raise unknown_name("thing", label, self._things)
         return self._things[label]

@@ -38,7 +38,6 @@ class AlteredConfig(MujocoConfig):
     leg_torque: float = 1.0
 
     def __post_init__(self) -> None:
-        """Check the numbers; see `MujocoConfig`."""
         super().__post_init__()
         if not (0.0 < self.grip <= 10.0 and 0.0 < self.leg_torque <= 10.0):
             raise ConfigError("The altered twin's grip and leg_torque are factors above 0 and up to 10.")
@@ -104,7 +103,6 @@ class TrueBase:
         """Forget nothing."""
 
     def step(self, state: LowState, dt: float) -> BaseEstimate:
-        """Return the truth; see `BaseEstimator`."""
         return self._truth.estimate(state.t)
 
 

@@ -60,7 +60,6 @@ class BlameVerdict:
     """What was found of one method of a run.
 
     Attributes:
-        rung, method, strata: of the run.
         singles: oracle -> lost trials that it wins, won trials that it loses (-1: not looked at), and its points.
         pairs, shares, total: of the oracles that matter: points of two, Shapley's share, points of all together.
         all_wins: lost trials that are won with everything exchanged.

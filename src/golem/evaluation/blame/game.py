@@ -62,7 +62,6 @@ def points(strata: Strata, gains: Mapping[Any, float], compared: int = 1) -> Poi
     """Return the points of what changes each trial's success by `gains` (-1 to 1), by key.
 
     Args:
-        strata: the trials.
         gains: of every trial that was run again.
         compared: how many are compared; one is proved where the lower bound of 95 % for all of them is above 0
             (Bonferroni, one-sided).

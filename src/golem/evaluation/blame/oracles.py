@@ -50,7 +50,6 @@ def with_modules(stack: Stack, overrides: Mapping[str, str]) -> Stack:
     """Return `stack` with what a command replaces in it.
 
     Args:
-        stack: any.
         overrides: key of the stack file -> implementation; `oracle` -> names of `ORACLES`, joined by `+`, which come
             last. `localizer=truth` is one, too.
 

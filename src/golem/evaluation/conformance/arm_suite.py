@@ -43,7 +43,6 @@ class ArmSuite(Suite):
     late = rated = True
 
     def __init__(self) -> None:
-        """Find where the palms are in the posture of the samples."""
         kinematics = Kinematics()
         kinematics.update(samples.posture())
         self._palms = [kinematics.pose(f"{side}_gripper").copy() for side in ("left", "right")]

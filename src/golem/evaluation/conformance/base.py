@@ -25,8 +25,6 @@ class Candidate:
     """The module under test.
 
     Attributes:
-        slot: its slot.
-        use: what it is called.
         make: returns a new instance of it.
         memo: what the checks have found out and need not find out again.
         figures: what the check that runs has measured, by name with unit; a list is a course over time.
@@ -77,7 +75,6 @@ class Finding:
     """What became of one check.
 
     Attributes:
-        check, promise: its name and its promise.
         status: `passed`, `failed` or `skipped`.
         reason: why it failed or was skipped, in one line.
         trace: see `ModuleFault`.
@@ -97,7 +94,6 @@ class Report:
     """What became of one module.
 
     Attributes:
-        slot, use: which module.
         findings: one per check, in the order of the suite.
         lacks: what this machine lacks to run the module; None where it lacks nothing.
     """

@@ -78,11 +78,7 @@ def _keep(reports: list[Report], config: CheckConfig) -> None:
 
 @contextmanager
 def _shown(console: Console, module: str) -> Iterator[Callable[[Check], None]]:
-    """Show in a terminal which promise of `module` is asked, and since when; yields what is told the promise.
-
-    Raises:
-        KeyboardInterrupt: Ctrl-C; says where it was.
-    """
+    """Show which promise is asked, and since when; yields what is told it. Raises KeyboardInterrupt: says where."""
     columns = (SpinnerColumn(), TimeElapsedColumn(), TextColumn("{task.description}"))
     asked = "is made ready"
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:

@@ -13,17 +13,7 @@ from typing import cast
 
 from golem import registry
 from golem.errors import ConfigError, MissingExtra, MissingSystemLibrary, ModuleFault, unknown_name
-from golem.evaluation.conformance.base import (
-    FAILED,
-    PASSED,
-    SKIPPED,
-    Candidate,
-    Check,
-    Finding,
-    Inapplicable,
-    Report,
-    checks_of,
-)
+from golem.evaluation.conformance import base
 from golem.evaluation.conformance.suite import Suite
 from golem.evaluation.no_search import searching_forbidden
 from golem.options import check_values, read_yaml
@@ -76,31 +66,22 @@ UNCHECKED: dict[str, dict[str, str]] = _DATA["unchecked"]
 
 
 def suite_of(slot: str) -> Suite:
-    """Return the suite of `slot`.
-
-    Raises:
-        ConfigError: there is no such slot.
-    """
+    """Return the suite of `slot`. Raises ConfigError: there is no such slot."""
     if slot not in SUITES:
         raise unknown_name("slot", slot, SUITES)
     module, _, name = SUITES[slot].partition(":")
     return getattr(import_module(module), name)()
 
 
-def promises(slot: str) -> tuple[Check, ...]:
-    """Return the checks of a slot's suite.
-
-    Raises:
-        ConfigError: there is no such slot.
-    """
-    return checks_of(type(suite_of(slot)))
+def promises(slot: str) -> tuple[base.Check, ...]:
+    """Return the checks of a slot's suite. Raises ConfigError: there is no such slot."""
+    return base.checks_of(type(suite_of(slot)))
 
 
-def candidate(slot: str, use: str) -> Candidate:
+def candidate(slot: str, use: str) -> base.Candidate:
     """Return the module `use` of `slot`, ready to be made.
 
     Args:
-        slot: its slot.
         use: registered name, `file.py:Class`, `package.module:Class`, or `{use: NAME, option: value, ...}`.
 
     Raises:
@@ -111,7 +92,7 @@ def candidate(slot: str, use: str) -> Candidate:
     name, options = choice_of(use)
     options = options or OPTIONS.get(slot, {}).get(name, {})
     registry.load(slot, name)
-    return Candidate(slot, name, lambda: registry.create(slot, name, options, **suite.context()))
+    return base.Candidate(slot, name, lambda: registry.create(slot, name, options, **suite.context()))
 
 
 def choice_of(use: str) -> tuple[str, Mapping[str, object]]:
@@ -131,53 +112,55 @@ def choice_of(use: str) -> tuple[str, Mapping[str, object]]:
     return str(chosen["use"]), options
 
 
-def examine(subject: Candidate, on_check: Callable[[Check], None] = lambda check: None) -> Report:
+def examine(subject: base.Candidate, on_check: Callable[[base.Check], None] = lambda check: None) -> base.Report:
     """Run every check of the suite of its slot on `subject`; nothing that the module does is raised."""
     with searching_forbidden():
         return run_suite(suite_of(subject.slot), subject, on_check)
 
 
-def run_suite(suite: object, subject: Candidate, on_check: Callable[[Check], None]) -> Report:
+def run_suite(suite: object, subject: base.Candidate, on_check: Callable[[base.Check], None]) -> base.Report:
     """Run every check of `suite` on `subject`; see `examine`."""
-    findings, closed = list[Finding](), ""
-    for check in checks_of(type(suite)):
+    findings, closed = list[base.Finding](), ""
+    for check in base.checks_of(type(suite)):
         on_check(check)
         if closed:
-            finding = Finding(check.name, check.promise, SKIPPED, f"not asked: {closed} failed")
+            finding = base.Finding(
+                check.name, check.promise, base.SKIPPED, f"not asked: '{closed.replace('_', ' ')}' failed"
+            )
         else:
             try:
                 with cpu_limit():
                     finding = _ask(suite, check, subject)
             except (MissingExtra, MissingSystemLibrary) as lack:
-                return Report(subject.slot, subject.use, tuple(findings), str(lack))
+                return base.Report(subject.slot, subject.use, tuple(findings), str(lack))
             except Endless as overdue:
-                finding, closed = Finding(check.name, check.promise, FAILED, str(overdue)), check.name
+                finding, closed = base.Finding(check.name, check.promise, base.FAILED, str(overdue)), check.name
         findings.append(finding)
-        if check.gate and finding.status == FAILED:
+        if check.gate and finding.status == base.FAILED:
             closed = check.name
-    return Report(subject.slot, subject.use, tuple(findings))
+    return base.Report(subject.slot, subject.use, tuple(findings))
 
 
-def _ask(suite: object, check: Check, subject: Candidate) -> Finding:
+def _ask(suite: object, check: base.Check, subject: base.Candidate) -> base.Finding:
     subject.figures = {}
     try:
         with _own_faults(subject):
             check.run(suite, subject)
-    except Inapplicable as why:
-        return Finding(check.name, check.promise, SKIPPED, str(why))
+    except base.Inapplicable as why:
+        return base.Finding(check.name, check.promise, base.SKIPPED, str(why))
     except ModuleFault as fault:
-        if isinstance(fault.__cause__, Inapplicable):
-            return Finding(check.name, check.promise, SKIPPED, str(fault.__cause__))
-        return Finding(check.name, check.promise, FAILED, fault.reason, fault.trace, subject.figures)
-    return Finding(check.name, check.promise, PASSED, figures=subject.figures)
+        if isinstance(fault.__cause__, base.Inapplicable):
+            return base.Finding(check.name, check.promise, base.SKIPPED, str(fault.__cause__))
+        return base.Finding(check.name, check.promise, base.FAILED, fault.reason, fault.trace, subject.figures)
+    return base.Finding(check.name, check.promise, base.PASSED, figures=subject.figures)
 
 
 @contextmanager
-def _own_faults(subject: Candidate) -> Iterator[None]:
+def _own_faults(subject: base.Candidate) -> Iterator[None]:
     """Turn what a module raises where it is made, or hands the suite to trip over, into its fault."""
     try:
         yield
-    except (ModuleFault, Inapplicable, MissingExtra, MissingSystemLibrary):
+    except (ModuleFault, base.Inapplicable, MissingExtra, MissingSystemLibrary):
         raise
     except (Exception, SystemExit) as error:  # a user's module may raise anything, and return anything
         raise ModuleFault.of(subject.slot, subject.use, error) from error

@@ -82,8 +82,7 @@ class HandSuite(Suite):
         if given.asked is not None:
             what, amount = given.asked
             (module.open if what == "open" else module.close)(amount)
-        command = module.step(given.state, given.state.t)
-        return HandAnswer(command, module.status())
+        return HandAnswer(module.step(given.state, given.state.t), module.status())
 
     def judge(self, contract: ContractCheck, answer: HandAnswer) -> None:
         command: Any = answer.command

@@ -45,7 +45,6 @@ class LegSuite(Suite):
     late = rated = True
 
     def __init__(self) -> None:
-        """Ask for nothing until the module says what it can."""
         self._envelope = Envelope()
 
     def context(self) -> Mapping[str, object]:

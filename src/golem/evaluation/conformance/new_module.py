@@ -40,7 +40,7 @@ def run_new(config: NewConfig, folder: Path = Path()) -> list[Path]:
     if slot not in SUITES:
         raise unknown_name("slot", slot, SUITES)
     if not re.fullmatch(r"[a-z][a-z0-9_]*", name) or keyword.iskeyword(name):
-        raise ConfigError(f"A module's name is lower-case words joined by _, e.g. my_{slot}; not '{name}'.")
+        raise ConfigError(f"A module's name is lower-case words joined by _ and no word of Python's; not '{name}'.")
     words = {"slot": slot, "name": name, "cls": "".join(word.capitalize() for word in name.split("_"))}
     templates = resources.files(__package__ or "") / TEMPLATES
     source = (templates / f"{slot}.py.txt").read_text(encoding="utf-8").replace("Mine", words["cls"])
@@ -50,9 +50,8 @@ def run_new(config: NewConfig, folder: Path = Path()) -> list[Path]:
         folder / f"test_{name}.py": texts["test"].format(**words),
         folder / f"{name}.yaml": texts["stacks"].get(slot, texts["stack"]).format(**words),
     }
-    for path in files:
-        if path.exists():
-            raise ConfigError(f"{path.name} is there already; choose another name, or another folder.")
+    if there := [path.name for path in files if path.exists()]:
+        raise ConfigError(f"{there[0]} is there already; choose another name, or another folder.")
     try:
         for path, text in files.items():
             path.write_text(text, encoding="utf-8")

@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 
 from golem.capabilities.arms.postures import posture
-from golem.capabilities.arms.trajectory import check_trajectory
+from golem.capabilities.arms.trajectory import check_trajectory, interpolate
 from golem.capabilities.collision.obstacles import Obstacle, World
 from golem.capabilities.planning.base import STRONGEST, ArmPlanner, Plan, PlanRefused, PlanRequest
-from golem.capabilities.planning.hermite import interpolate
 from golem.capabilities.planning.joint_space import JointSpace, PlanningRobot
 from golem.capabilities.planning.path_planner import fine_points
 from golem.evaluation.conformance import samples

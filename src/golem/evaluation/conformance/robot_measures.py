@@ -51,7 +51,6 @@ def gap_to_own_arm(q: Array, depth: NDArray[np.float32], info: CameraInfo, calib
     Args:
         q: (27,) joints [rad].
         depth: (height, width) of the head camera [m].
-        info: that camera.
         calibration: (4, 4), see `golem.robots.base.Robot`.
 
     Returns:
@@ -292,8 +291,7 @@ class RobotMeasures:
             for side in SIDES:
                 for gap in GAPS:
                     self._opening(candidate, rig, side, gap)
-                pressed = rig.grip(side, 0.0, PRESSED, GRIP_TIME)
-                force = float(pressed.force.mean())
+                force = float(rig.grip(side, 0.0, PRESSED, GRIP_TIME).force.mean())
                 rig.grip(side, OPEN, PRESSED, 1.0)
                 candidate.figures[f"{side}: force of {PRESSED:g} N [N]"] = force
                 if abs(force - PRESSED) > GRIP_ERROR * PRESSED:

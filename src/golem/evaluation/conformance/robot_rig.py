@@ -69,11 +69,7 @@ class RobotRig:
         return self._robot.capture(camera)
 
     def scan(self) -> NDArray[np.float32]:
-        """Return the (n, 3) points of one LiDAR scan in lidar_link [m].
-
-        Raises:
-            Inapplicable: it has no LiDAR.
-        """
+        """Return the (n, 3) points of one LiDAR scan in lidar_link [m]. Raises Inapplicable: it has no LiDAR."""
         if not isinstance(self._robot, HasLidar):
             raise Inapplicable("it has no LiDAR")
         scan = None

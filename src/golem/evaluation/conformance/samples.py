@@ -109,8 +109,7 @@ def hand_state(t: float, gap: float, force: float = 0.0) -> HandState:
 def _picture(info: CameraInfo) -> tuple[Array, Array]:
     """Return colour and depth of a grey plate with dark round spots, half a metre below the camera."""
     v, u = np.mgrid[: info.height, : info.width]
-    radius = np.hypot((u % 80) - 40.0, (v % 80) - 40.0)
-    spot = radius < 9.0
+    spot = np.hypot((u % 80) - 40.0, (v % 80) - 40.0) < 9.0
     grey = 150.0 + 20.0 * np.sin(0.05 * u) - 90.0 * spot
     rgb = np.repeat(np.clip(grey, 0, 255)[..., None], 3, axis=2)
     return rgb, np.where(spot, 0.49, 0.50) * rays(info)[..., 2].astype(np.float64)
@@ -126,8 +125,7 @@ def image(t: float, info: CameraInfo = HEAD) -> RgbdImage:
 
 def seen_object(t: float, position: Array, points: int = 200) -> LocalizedObject:
     """Return a screw seen at `position` (3,) in odom [m], with so many points of its surroundings."""
-    rng = np.random.default_rng(7)
-    spread = rng.uniform(-0.02, 0.02, (points, 3)) * (1.0, 1.0, 0.0)
+    spread = np.random.default_rng(7).uniform(-0.02, 0.02, (points, 3)) * (1.0, 1.0, 0.0)
     cloud = position + spread - np.where(np.hypot(*spread[:, :2].T) < 0.007, 0.0, 0.015)[:, None] * (0, 0, 1)
     box = np.array([310.0, 230.0, 330.0, 250.0])
     return LocalizedObject(Detection("screw", 0.9, box, np.array([320.0, 240.0])), t, position.copy(), cloud)

@@ -120,11 +120,7 @@ class SkillSuite(Suite):
 
 
 def goal_for(module: Any) -> Any:
-    """Return a goal for a skill: default values where there are any, else simple ones.
-
-    Raises:
-        Inapplicable: the skill refuses that goal.
-    """
+    """Return a goal: defaults where there are any, else simple values. Raises Inapplicable: the skill refuses it."""
     schema = schema_of(module.Goal)
     fields = {name: _simple(schema["properties"][name]) for name in schema["required"]}
     try:

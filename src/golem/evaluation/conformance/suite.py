@@ -66,7 +66,6 @@ class Suite:
     """The suite of one slot. A subclass says how its modules are called; the checks here ask the rest.
 
     Attributes:
-        slot: the slot.
         contracts: protocols that a module must have the members of.
         forgets: whether `begin` makes a module start over; else it is made anew where that matters.
         refuses_nan: whether NaN among its inputs must not come out of it again.
@@ -166,8 +165,7 @@ class Suite:
     @check
     def repeats_itself(self, candidate: Candidate) -> None:
         """Two new instances answer the same input alike, bit for bit."""
-        second = self.run(candidate, self.inputs())
-        self._compare(candidate, second, "a second instance answers otherwise")
+        self._compare(candidate, self.run(candidate, self.inputs()), "a second instance answers otherwise")
 
     @check
     def starts_over(self, candidate: Candidate) -> None:

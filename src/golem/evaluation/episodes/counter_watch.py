@@ -80,7 +80,6 @@ class CounterWatch(ErrandWatch):
         self._highest = np.array([thing.position[2] for thing in self._before])
 
     def __call__(self) -> None:
-        """Look on."""
         self.look()
         feedback = self._news.read()
         if feedback is not None and (feedback.stage in PICTURED or feedback.data.get("failed")):
@@ -92,11 +91,7 @@ class CounterWatch(ErrandWatch):
         return super().look()
 
     def problem(self, place: tuple[float, float]) -> str | None:
-        """Return what is not as it was asked for, in a sentence; None where all is.
-
-        Args:
-            place: x, y in the world where one of the kind was to be set down [m].
-        """
+        """Return what is not as asked for at `place`, x, y in the world [m], in a sentence; None where all is."""
         now = self._things()
         lifted = self._lifted()
         if not lifted:

@@ -1,18 +1,26 @@
-"""One robot on its feet under judgement: the whole stack in lock-step, pushed and watched from outside."""
+"""One robot on its feet under judgement: the whole stack in lock-step, pushed and watched from outside.
+
+It is an error model, no sensor. With the source `estimator` it adds noise to what the base estimator says: drift and
+all, nothing the robot could not know. With `truth` it adds the noise to where the robot really is, which is what a
+LiDAR odometry without drift would tell; nothing measured with that says how well the robot finds its way by itself.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
+
+import numpy as np
 
 from golem.errors import ConfigError
 from golem.evaluation.base import Onlooker
 from golem.evaluation.blame.oracles import with_modules
-from golem.evaluation.episodes.simulated_odometry import SimulatedOdometry
 from golem.hardware.safety.base import SafetyLimits
 from golem.interfaces import topics
+from golem.interfaces.payloads import Odometry
+from golem.middleware.bus import Bus
 from golem.robots.mujoco.balance import BalanceRecorder
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.mujoco.shoves import Push, Pusher
@@ -23,6 +31,54 @@ from golem.skills.context import Context
 from golem.skills.runner import SkillRun
 from golem.stack import Choice, Stack, load_stack
 from golem.types import Array, Twist
+
+Source = Literal["estimator", "truth"]
+
+POSITION_NOISE = 0.01
+"""Standard deviation of x and of y [m]."""
+YAW_NOISE = float(np.radians(1.0))
+"""Standard deviation of the heading [rad]."""
+PERIOD = 0.1
+"""Time between two poses [s]: one turn of a LiDAR."""
+ODOMETRY_LATENCY = 0.05
+"""Time from a pose to its arrival [s]."""
+
+
+class SimulatedOdometry:
+    """Publishes `topics.ODOMETRY` for a twin; call it after every tick."""
+
+    def __init__(self, bus: Bus, robot: MujocoRobot, source: Source, rng: np.random.Generator) -> None:
+        """Tell `bus` where `robot` is by `source`, with independent noise of every pose drawn from `rng`."""
+        self._bus, self._robot, self._source, self._rng = bus, robot, source, rng
+        self._T_odom_world = np.linalg.inv(robot.truth.T_world_odom)
+        self._next = 0.0
+
+    @property
+    def due(self) -> float:
+        """When the next pose is due [s]."""
+        return self._next
+
+    def __call__(self, t: float) -> None:
+        """Publish a pose, if one is due at time `t` [s]."""
+        if t < self._next - 1e-9:
+            return
+        self._next = t + PERIOD
+        dx, dy = self._rng.normal(0.0, POSITION_NOISE, 2)
+        turn = self._rng.normal(0.0, YAW_NOISE)
+        if self._source == "truth":
+            T = self._T_odom_world @ self._robot.truth.base().T_world_base
+        else:
+            base = self._bus.latest(topics.BASE)
+            if base is None:
+                return
+            T = base.T_odom_base.copy()
+        c, s = np.cos(turn), np.sin(turn)
+        noise = np.eye(3)
+        noise[:2, :2] = ((c, -s), (s, c))
+        T[:3, :3] = noise @ T[:3, :3]
+        T[:2, 3] += (dx, dy)
+        self._bus.publish(topics.ODOMETRY, Odometry(t, T), t, ODOMETRY_LATENCY)
+
 
 SLOT = "lower_body"
 """What methods that walk and stand are."""
@@ -40,7 +96,6 @@ def with_legs(stack: Stack, method: str) -> Stack:
     """Return `stack` with the lower body a method stands for.
 
     Args:
-        stack: any stack.
         method: a registered name, a user's `file.py:Class` or `package.module:Class`, either with options as
             `{use: NAME, option: value}`, or the files of a policy as `policy:DESCRIPTION` or
             `policy:DESCRIPTION:NETWORK`; `vendor:DESCRIPTION:NETWORK` runs them on board.
@@ -61,7 +116,6 @@ def legs_stack(
 
     Args:
         method: see `with_legs`.
-        profile: realism profile.
         overrides: slot -> implementation that replaces the stack's own; another twin keeps the options.
         robot: options of the twin that differ from the stack's own; without any, an open floor.
 
@@ -91,7 +145,6 @@ class Loss:
     Attributes:
         stage: `settle` (it never carried its weight), `fall`, `safety` (its gate stopped it, as an operator's e-stop
             would) or `fault` (the leg controller broke its contract, and the fallback took over).
-        detail: one sentence.
         trace: where in its code a module raised, as Python prints it; None where none did.
     """
 
@@ -109,12 +162,7 @@ HANGS = Loss("settle", f"The robot did not carry its weight within {READY:g} s."
 
 
 def lost(running: LockstepRunner, recorder: BalanceRecorder | None) -> Loss | None:
-    """Return how the robot of a stack was lost; None while it was not.
-
-    Args:
-        running: the stack.
-        recorder: what has watched it since it carried its weight; None for a robot that hangs.
-    """
+    """Return how the robot of a stack was lost, if it was; `recorder` watched it since it stood, None in a hoist."""
     t, safety = running.executor.t, running.safety
     legs = running.bus.latest(topics.LEG_STATUS)
     if legs is not None and legs.fault is not None:
@@ -130,7 +178,6 @@ class Episode:
     """A robot that pursues a skill while it is pushed and recorded.
 
     Attributes:
-        running, robot: the stack and its twin.
         recorder: samples the twin's balance after every tick.
         height: at which it is to stand [m]; None is that of its legs.
     """

@@ -58,8 +58,6 @@ class LidarWalk:
 
     Attributes:
         seed: of world and sensors.
-        profile: realism profile.
-        scene: world and robot.
         t: (n,) time [s].
         qpos, qvel: (n, ...) states of the twin.
         legs: what the base estimator said.
@@ -139,10 +137,7 @@ def record_walk(
     """Let the robot walk a route, its arms moving.
 
     Args:
-        route: where.
-        index: number of the walk.
         seed: seed of all walks.
-        profile: realism profile.
         legs: lower body.
         people: how many walk around it.
         overrides: stack slot -> implementation; the estimator is `ESTIMATOR` where it names none.
@@ -180,7 +175,7 @@ def record_walk(
         rows.append((episode.t, data.qpos.copy(), data.qvel.copy(), legs, pose()))
         return walking and pilot.done
 
-    try:
+    with closing(episode):
         # An odometry finds its level and its biases at rest: neither legs nor arms move before.
         episode.run(START, sample)
         walking = True
@@ -189,8 +184,6 @@ def record_walk(
         episode.run(length / SLOWEST + 10.0, sample)
         episode.run(REST, sample)
         loss = episode.loss
-    finally:
-        episode.close()
     t, qpos, qvel, T = (np.array([row[i] for row in rows]) for i in (0, 1, 2, 4))
     commands = [row[3] for row in rows]
     lost = loss.detail if loss is not None else "" if pilot.done else "It did not get to the end of its route."
@@ -275,7 +268,6 @@ def nees(track: PoseTrack, since: float) -> tuple[float, float] | None:
     """Return the mean squared error of an anchored track over its covariance, per degree of freedom.
 
     Args:
-        track: the track.
         since: time from which it counts [s].
 
     Returns:

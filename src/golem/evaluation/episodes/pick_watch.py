@@ -9,9 +9,8 @@ import mujoco
 import numpy as np
 
 from golem.evaluation.base import DONE
-from golem.evaluation.episodes.contacts import FLOOR
 from golem.evaluation.episodes.counter_watch import ErrandWatch
-from golem.evaluation.episodes.oracle import GraspTruth, Oracle
+from golem.evaluation.episodes.oracle import FLOOR, GraspTruth, Oracle
 from golem.evaluation.episodes.pick_claims import Fastener
 from golem.interfaces import topics
 from golem.interfaces.payloads import HandGoal
@@ -66,7 +65,6 @@ class PickTouches:
         return math.inf if self._told else -math.inf
 
     def __call__(self) -> None:
-        """Look now."""
         contact = self._robot.data.contact
         pairs = contact.geom
         if not len(pairs):
@@ -125,7 +123,6 @@ class PickWatch(ErrandWatch):
         return -math.inf if self._stage == "extract" else min(super().due(), self._touches.due())
 
     def __call__(self) -> None:
-        """Look on."""
         self.look()
         self._touches()
         feedback = self._news.read()

@@ -27,11 +27,7 @@ PACK = ("screw", "nut", "bus_bar", "tray", "screw_hole")
 
 
 class TrueMasks:
-    """Every part that is seen of what the twin's world names; a `Localizer`.
-
-    Attributes:
-        latency: declared time per frame [s].
-    """
+    """Every part that is seen of what the twin's world names; a `Localizer`."""
 
     latency = 0.02
 
@@ -43,7 +39,6 @@ class TrueMasks:
         self._lift = LiftConfig()
 
     def locate(self, frame: RgbdImage, labels: Sequence[str]) -> list[LocalizedObject]:
-        """Return what is seen of `labels`; see `Localizer`."""
         state = min(self._robot.exposures, key=lambda kept: abs(kept[0] - frame.t), default=None)
         if state is None or not labels:
             return []

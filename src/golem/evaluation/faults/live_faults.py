@@ -67,11 +67,7 @@ class LiveRobot:
         self._participant, self.link, self._dds = participant, link, dds
 
     def kill(self, name: str, number: signal.Signals) -> None:
-        """Send a signal to one of its processes.
-
-        Raises:
-            GolemError: there is none of that name.
-        """
+        """Send a signal to one of its processes. Raises GolemError: there is none of that name."""
         for found in discovery.members(self._participant):
             who = owner(self._participant, found.guid)
             process = re.search(r"\(process (\d+)", who)

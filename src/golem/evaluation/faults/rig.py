@@ -86,9 +86,6 @@ class Injection:
     """One fault.
 
     Attributes:
-        name: what people call it.
-        source: where it comes from.
-        expect: what the gate has to do.
         reasons: the right ones for a stop.
         within: robot time in which the gate has to stop [s].
         lasting: how long it is watched [s].
@@ -163,11 +160,6 @@ class FaultRig:
     """A robot in operation, and the way into its safety layer.
 
     Attributes:
-        bus: every stream.
-        robot: the twin.
-        executor: the clock.
-        gate: the safety process.
-        estop: its emergency stop.
         clock: what the gate's clock shows beyond the robot's time [s].
         held: whether the gate does not run.
         fault: what is being tried; None before.
@@ -180,11 +172,7 @@ class FaultRig:
     period = TICK
 
     def __init__(self, stack: Stack, seed: int) -> None:
-        """Build the robot of `stack` for the twin's `seed`.
-
-        Raises:
-            ConfigError, ModuleFault: see `LockstepRunner`.
-        """
+        """Build the robot of `stack` for the twin's `seed`. Raises ConfigError, ModuleFault: see `LockstepRunner`."""
         robot = build_robot(stack, seed)
         assert isinstance(robot, MujocoRobot)
         self.robot = robot

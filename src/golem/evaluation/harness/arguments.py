@@ -62,11 +62,7 @@ def _range(name: str, values: str) -> list[Value]:
 
 
 def replaced_modules(words: Iterable[str]) -> dict[str, str]:
-    """Return slot -> implementation that `slot=implementation` words of `--use` give.
-
-    Raises:
-        ConfigError: a word reads otherwise, or two name the same slot.
-    """
+    """Return slot -> implementation by the words of `--use`. Raises ConfigError: one reads otherwise, or is double."""
     replaced: dict[str, str] = {}
     for word in words:
         slot, equals, implementation = word.partition("=")
@@ -79,11 +75,7 @@ def replaced_modules(words: Iterable[str]) -> dict[str, str]:
 
 
 def robot_options(words: Iterable[str]) -> dict[str, Any]:
-    """Return the twin's options that `name=value` words give; values are YAML, e.g. `payload=[1, 1]`.
-
-    Raises:
-        ConfigError: a word is no option.
-    """
+    """Return the twin's options by `name=value` words, YAML, e.g. `payload=[1, 1]`. Raises ConfigError: one is none."""
     options: dict[str, Any] = {}
     for word in words:
         name, equals, value = word.partition("=")

@@ -19,11 +19,7 @@ class CopyDied(Exception):
 
 
 def in_a_copy(function: Callable[[], R]) -> R:
-    """Return what `function` returns in a copy of this process: whatever it changes is as before here.
-
-    Raises:
-        CopyDied: it raised, or the copy died.
-    """
+    """Return what `function` returns in a copy of this process. Raises CopyDied: it raised, or the copy died."""
     reading, writing = os.pipe()
     with warnings.catch_warnings():
         # Of forks while threads run; those of a worker wait for its parent's end and for its time to be over.

@@ -82,11 +82,7 @@ class LadderConfig:
     """The rung's own options, see `Rung.Options`; None are its defaults."""
 
     def whole(self) -> LadderConfig:
-        """Return the configuration with the rung's defaults in the place of what is left open.
-
-        Raises:
-            ConfigError: there is no such rung.
-        """
+        """Return the configuration, what is left open by the rung's defaults. Raises ConfigError: no such rung."""
         kind = rung_class(self.rung)
         return replace(
             self,
@@ -102,11 +98,7 @@ class LadderConfig:
         return command_line("golem ladder", self.whole(), always=("rung", "seed"))
 
     def rule(self, cases: int = 1) -> StopRule:
-        """Return by what comparisons are decided, on a rung with so many `cases`.
-
-        Raises:
-            ConfigError: an option of it cannot be.
-        """
+        """Return by what comparisons of so many `cases` are decided. Raises ConfigError: an option of it cannot be."""
         own = max(1, len(self.method) * (len(self.method) - 1) // 2) * cases
         return StopRule(self.margin, own if self.comparisons is None else self.comparisons, self.score)
 
@@ -117,9 +109,7 @@ class LadderResult:
 
     Attributes:
         config: what was asked, with the rung's defaults.
-        out: the run folder.
         records: its trials, in canonical order.
-        summary: rates, comparisons, failures and times.
         own: the tables of the rung's own.
         report: path of the HTML report; None where what draws it is not installed.
         note: why there is none.
@@ -147,11 +137,7 @@ class LadderInterrupted(KeyboardInterrupt):
 
 
 def read_ladder(words: list[str]) -> LadderConfig:
-    """Return the configuration that the words of a command line mean; the rung they name adds its own options.
-
-    Raises:
-        ConfigError: there is no such rung.
-    """
+    """Return what the words of a command line mean, with the rung's own options. Raises ConfigError: no such rung."""
     names = [b for a, b in zip(words, words[1:], strict=False) if a == "--rung"]
     names += [word.partition("=")[2] for word in words if word.startswith("--rung=")]
     kind = rung_class(names[-1] if names else LadderConfig.rung)
@@ -275,11 +261,7 @@ def prepare(config: LadderConfig) -> tuple[Request, Provenance]:
 
 
 def find_trial(config: LadderConfig, request: Request) -> tuple[TrialSpec, TrialRecord | None]:
-    """Return the trial that `--show` names, and its record where the run folder has one.
-
-    Raises:
-        golem.errors.ConfigError: there is no such trial.
-    """
+    """Return the trial that `--show` names, and its record if there is one. Raises ConfigError: no such trial."""
     assert config.show is not None and config.out is not None
     records = {record.key: record for record in read_records(config.out / "trials.jsonl")}
     method, _, index = config.show.rpartition(":")

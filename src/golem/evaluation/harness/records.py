@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
-from golem.errors import OutputError
+from golem.errors import OutputError, shorten
 from golem.evaluation.base import Case, TrialOutcome, TrialSpec, case_name
 from golem.provenance import digest
 
@@ -21,6 +21,8 @@ SCHEMA = 2
 """Version of the record's fields; raised when one changes its meaning."""
 SORTED = ("overrides", "options", "versions", "timings", "series")
 """Fields whose names are written in alphabetical order."""
+_JSON = {"int": (int,), "str": (str,), "bool": (bool,), "str | None": (str, type(None))}
+"""Type of a field -> what JSON has for it; the others are mappings."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,11 +90,7 @@ class TrialRecord:
 
     @classmethod
     def parse(cls, line: str) -> TrialRecord:
-        """Return the record of one line.
-
-        Raises:
-            ValueError: the line is not a record of this schema.
-        """
+        """Return the record of one line. Raises ValueError: the line is not a record of this schema."""
         data = json.loads(line)
         if not isinstance(data, dict) or "schema" not in data:
             raise ValueError("no trial record")
@@ -102,7 +100,17 @@ class TrialRecord:
             )
         if set(data) != {f.name for f in fields(cls)}:
             raise ValueError("a trial record with missing or unknown fields")
-        return cls(**data)
+        wrong = [f.name for f in fields(cls) if type(data[f.name]) not in _JSON.get(str(f.type), (dict,))]
+        if wrong:
+            raise ValueError(f"a trial record whose '{wrong[0]}' is {shorten(repr(data[wrong[0]]), 40)}")
+        record = cls(**data)
+        try:
+            if record.index < 0:
+                raise ValueError("its index is below 0")
+            _ = record.key, record.outcome  # they refuse what no trial has
+        except (TypeError, ValueError) as error:
+            raise ValueError(f"a trial record that cannot be ({error})") from error
+        return record
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,35 +132,20 @@ class Provenance:
     code: str = field(init=False)
 
     def __post_init__(self) -> None:
-        """Hash what is hashed."""
         object.__setattr__(self, "configs", {method: digest(facts) for method, facts in self.facts.items()})
         object.__setattr__(self, "code", digest(self.files))
 
     def record(self, spec: TrialSpec, outcome: TrialOutcome) -> TrialRecord:
         """Return the record of one finished trial."""
         return TrialRecord(
-            schema=SCHEMA,
-            rung=spec.rung,
-            method=spec.method,
-            profile=spec.profile,
-            seed=spec.seed,
-            index=spec.index,
-            overrides=dict(spec.overrides),
-            options=dict(spec.options),
-            case=dict(spec.case),
-            config=self.configs[spec.method],
-            code=self.code,
-            commit=self.commit,
-            versions=self.versions,
-            success=bool(outcome.success),
-            stage=outcome.stage,
-            module=outcome.module,
-            detail=outcome.detail,
+            schema=SCHEMA, rung=spec.rung, method=spec.method, profile=spec.profile, seed=spec.seed, index=spec.index,
+            overrides=dict(spec.overrides), options=dict(spec.options), case=dict(spec.case),
+            config=self.configs[spec.method], code=self.code, commit=self.commit, versions=self.versions,
+            success=bool(outcome.success), stage=outcome.stage, module=outcome.module, detail=outcome.detail,
             timings={name: float(value) for name, value in outcome.timings.items()},
             series={name: float(value) for name, value in outcome.series.items()},
-            picture=None if outcome.picture is None else f"pictures/{trial_name(spec)}.png",
-            trace=outcome.trace,
-        )
+            picture=None if outcome.picture is None else f"pictures/{trial_name(spec)}.png", trace=outcome.trace,
+        )  # fmt: skip
 
 
 def trial_name(trial: TrialSpec | TrialRecord) -> str:
@@ -174,7 +167,7 @@ def read_records(path: Path) -> list[TrialRecord]:
     """Return the records of a `trials.jsonl`; a last line that a kill tore off is left out.
 
     Raises:
-        golem.errors.OutputError: another line is no trial record, or the file cannot be read.
+        golem.errors.OutputError: another line is no trial record, or one that was there, or the file cannot be read.
     """
     try:
         text = path.read_bytes()
@@ -182,13 +175,16 @@ def read_records(path: Path) -> list[TrialRecord]:
         return []
     except OSError as error:
         raise OutputError(f"Cannot read {path}: {error.strerror}.") from error
-    records = []
+    records: dict[tuple[str, str, int], TrialRecord] = {}
     for number, line in enumerate(text[: whole_lines(text)].splitlines(), start=1):
         try:
-            records.append(TrialRecord.parse(line.decode()))
-        except ValueError as error:
+            record = TrialRecord.parse(line.decode())
+            if record.key in records:
+                raise ValueError(f"the second record of trial {record.index} of {record.method}")
+            records[record.key] = record
+        except (ValueError, RecursionError) as error:
             raise OutputError(f"Line {number} of {path} is {error}; choose another folder.") from error
-    return records
+    return list(records.values())
 
 
 def whole_lines(text: bytes) -> int:

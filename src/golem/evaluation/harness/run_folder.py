@@ -18,8 +18,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from golem.errors import ConfigError, OutputError
-from golem.evaluation.base import TrialOutcome, TrialSpec, case_name
+from golem.errors import ConfigError, OutputError, unknown_name
+from golem.evaluation.base import RUNGS, TrialOutcome, TrialSpec, case_name
 from golem.evaluation.harness.records import Provenance, TrialRecord, artefacts, read_records, whole_lines
 from golem.output_file import write_file
 from golem.provenance import changes
@@ -34,7 +34,6 @@ class Finished:
     """A trial that came to an outcome.
 
     Attributes:
-        outcome: what became of it.
         wall, cpu: what it cost on its machine [s].
         active: robot time in which its gate let commands through [s]; None where that was not counted.
         stops: stops of that gate by reason, without those that were asked for.
@@ -57,11 +56,7 @@ class RunFolder(AbstractContextManager["RunFolder", None]):
     """
 
     def __init__(self, path: Path) -> None:
-        """Make the folder at `path` where needed and take its lock.
-
-        Raises:
-            golem.errors.OutputError: it cannot be written, or another run holds it.
-        """
+        """Make the folder at `path` where needed, and lock it. Raises OutputError: another run has it, or no access."""
         self.path = path
         self._made = not path.exists()
         self._trials = path / "trials.jsonl"
@@ -122,7 +117,7 @@ class RunFolder(AbstractContextManager["RunFolder", None]):
         return records
 
     def _mixed(self, what: str, differences: Sequence[str]) -> OutputError:
-        named = "; ".join(differences[:SHOWN])
+        named = "; ".join(differences[:SHOWN]).replace("config.user_files.", "the content of your file for ")
         more = f"; and {len(differences) - SHOWN} more" if len(differences) > SHOWN else ""
         return OutputError(
             f"{self.path} holds trials that differ in {what} and cannot be mixed; choose another --out. "
@@ -141,11 +136,7 @@ class RunFolder(AbstractContextManager["RunFolder", None]):
         self.write_text(FACTS, json.dumps(facts, indent=1) + "\n")
 
     def append(self, record: TrialRecord, finished: Finished) -> None:
-        """Keep one finished trial: its files first, then its record, so that what a record names exists.
-
-        Raises:
-            golem.errors.OutputError: the disk refuses.
-        """
+        """Keep one finished trial, its record last, so that its files exist. Raises OutputError: the disk refuses."""
         cost = {"method": record.method, "case": dict(record.case), "index": record.index}
         cost |= {"wall": finished.wall, "cpu": finished.cpu, **finished.outcome.costs}
         if finished.active is not None:
@@ -209,14 +200,16 @@ def finished_records(folder: Path) -> list[TrialRecord]:
     records = read_records(trials)
     if not records:
         raise ConfigError(f"{folder} holds no trials; give the --out folder of a golem ladder or a golem study.")
+    if records[0].rung not in RUNGS:
+        raise unknown_name(f"rung of {trials}", records[0].rung, RUNGS)
     return records
 
 
 def read_facts(folder: Path) -> dict[str, Any]:
     """Return what `run.json` of a run folder says; nothing where there is none."""
     try:
-        return json.loads((folder / FACTS).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        return {**json.loads((folder / FACTS).read_text(encoding="utf-8"))}
+    except (OSError, ValueError, TypeError):
         return {}
 
 
@@ -225,8 +218,14 @@ def read_costs(folder: Path) -> list[dict[str, Any]]:
     path = folder / "timings.jsonl"
     if not path.is_file():
         return []
-    text = path.read_bytes()
-    return [json.loads(line) for line in text[: whole_lines(text)].splitlines()]
+    text, found = path.read_bytes(), list[dict[str, Any]]()
+    for number, line in enumerate(text[: whole_lines(text)].splitlines(), start=1):
+        try:
+            cost = json.loads(line)
+            found.append({**cost, "wall": float(cost["wall"]), "cpu": float(cost["cpu"])})
+        except (ValueError, TypeError, KeyError, RecursionError) as error:
+            raise OutputError(f"Line {number} of {path} says no times of a trial; choose another folder.") from error
+    return found
 
 
 def append_line(path: Path, line: str) -> None:

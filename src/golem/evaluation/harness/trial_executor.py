@@ -13,7 +13,7 @@ from collections.abc import Generator
 from contextlib import suppress
 from typing import Any, Protocol
 
-from golem.errors import ConfigError, GolemError, MissingExtra
+from golem.errors import ConfigError, GolemError, needs
 from golem.evaluation.harness.local_executor import LocalExecutor
 from golem.evaluation.harness.trials import Batch, Died, Ending
 from golem.robots.mujoco.gl import choose_backend
@@ -26,16 +26,9 @@ class DaskExecutor:
     """Runs batches on a cluster; see `TrialExecutor`. A worker that dies has its batches run on others."""
 
     def __init__(self, address: str) -> None:
-        """Connect to the scheduler at `address`, e.g. `tcp://10.0.0.1:8786`.
-
-        Raises:
-            MissingExtra: Dask is not installed.
-            ConfigError: no scheduler answers there.
-        """
-        try:
+        """Connect to a scheduler, e.g. `tcp://10.0.0.1:8786`. Raises MissingExtra: no Dask; ConfigError: no answer."""
+        with needs("distributed", "cluster"):
             import distributed
-        except ImportError as error:
-            raise MissingExtra("distributed", "cluster") from error
         try:
             self._client: Any = distributed.Client(address, timeout=PATIENCE)
         except (OSError, TimeoutError, ValueError) as error:
@@ -55,11 +48,7 @@ class DaskExecutor:
         self._done.add(future)
 
     def results(self) -> Generator[tuple[Batch, Ending], None, None]:
-        """Yield each batch and how it ended.
-
-        Raises:
-            GolemError: the cluster is gone, or a worker cannot run golem at all.
-        """
+        """Yield each batch and how it ended. Raises GolemError: the cluster is gone, or no worker can run golem."""
         while self._batches:
             future = next(self._done)
             batch = self._batches.pop(future)
@@ -123,11 +112,7 @@ class TrialExecutor(Protocol):
         ...
 
     def results(self) -> Generator[tuple[Batch, Ending], None, None]:
-        """Yield each batch and how it ended, until all that were submitted have.
-
-        Raises:
-            golem.errors.GolemError: nothing can run any more.
-        """
+        """Yield each batch and how it ended, until all have. Raises GolemError: nothing can run any more."""
         ...
 
     def close(self) -> None:

@@ -59,7 +59,6 @@ class Progress(AbstractContextManager["Progress", None]):
         sys.stderr.flush()
 
     def __exit__(self, *_: object) -> None:
-        """Leave the bar as it is."""
         self._bar.close()
 
 
@@ -87,7 +86,6 @@ class Request:
     Attributes:
         rung: made with its options.
         target: its `module:Class`.
-        methods: what is compared.
         n: trials per method and case.
         example: a trial, of which method, index and case are to be replaced.
         limit: time that a batch may take, see `LadderConfig` [s].

@@ -99,7 +99,6 @@ class Refused:
     Exceptions travel as text because not every exception survives pickling.
 
     Attributes:
-        message: one sentence for the user.
         trace: the stack trace where the fault is a programming error of the rung, else None.
     """
 

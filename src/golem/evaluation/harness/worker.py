@@ -88,8 +88,10 @@ def main(connection: Connection, report: int) -> None:
     batches: queue.SimpleQueue[Batch] = queue.SimpleQueue()
     watchdog = Watchdog(connection, report)
     threading.Thread(target=_listen, args=(connection, batches, watchdog), daemon=True).start()
-    while True:
-        watchdog.run(batches.get())
+    with suppress(BrokenPipeError):  # the parent is gone
+        while True:
+            watchdog.run(batches.get())
+    _end()
 
 
 if __name__ == "__main__":

@@ -87,11 +87,7 @@ def tracking_error(x: Array, delay: float, motion: RecordedMotion) -> float:
 
 
 def save(found: Identified, folder: Path, said: str) -> None:
-    """Write body, profile and a report that begins with what is `said` into `folder`.
-
-    Raises:
-        OutputError: they cannot be written.
-    """
+    """Write body, profile and a report that begins with `said` into `folder`. Raises OutputError: it cannot."""
     spec = body_spec(found.x)
     spec.compile()
     zeros, gains = (

@@ -23,7 +23,6 @@ class LabelledImage:
     """One image.
 
     Attributes:
-        path: its file.
         labels: (n,) class names of its boxes.
         boxes: (n, 4) x_min, y_min, x_max, y_max [px].
         ignored: numbers of the boxes that are neither asked for nor make what is found there wrong.
@@ -46,11 +45,7 @@ class LabelledImage:
         return counted
 
     def read(self) -> NDArray[np.uint8]:
-        """Return it as (height, width, 3) RGB.
-
-        Raises:
-            ConfigError: it cannot be read.
-        """
+        """Return it as (height, width, 3) RGB. Raises ConfigError: it cannot be read."""
         image = cv2.imread(str(self.path))
         if image is None:
             raise ConfigError(f"The image {self.path} cannot be read.")
@@ -88,8 +83,6 @@ def score_label(
     takes one detection; a crowd takes all of which it holds a share of `overlap`.
 
     Args:
-        label: the class.
-        images: the labelled images.
         found: detections of each image, by its number.
         overlap: least share of the union (IoU) that matches.
     """
@@ -183,11 +176,7 @@ def read_coco(folder: Path) -> list[LabelledImage]:
 
 
 def check_boxes(where: str, boxes: Array, width: int, height: int) -> None:
-    """Check that boxes (n, 4) [px] are in an image of this size.
-
-    Raises:
-        ConfigError: one reaches further beyond it than `EDGE`, or 2 px.
-    """
+    """Check that boxes (n, 4) [px] are in an image. Raises ConfigError: one is beyond by more than `EDGE`, or 2 px."""
     size = np.array([width, height], float)
     slack = np.maximum(EDGE * size, 2.0)
     wrong = (boxes[:, :2] < -slack).any(axis=1) | (boxes[:, 2:] > size + slack).any(axis=1)
@@ -199,11 +188,7 @@ def check_boxes(where: str, boxes: Array, width: int, height: int) -> None:
 
 
 def image_size(path: Path) -> tuple[int, int]:
-    """Return width and height of an image [px], turned as its EXIF data say.
-
-    Raises:
-        ConfigError: it cannot be read.
-    """
+    """Return width and height of an image [px], turned as its EXIF data say. Raises ConfigError: it cannot be read."""
     try:
         with Image.open(path) as image:
             turned = image.getexif().get(_TURNED[0]) in _TURNED[1]

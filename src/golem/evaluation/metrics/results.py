@@ -48,7 +48,6 @@ class GateHours:
         return cls(len(counted), sum(float(line["active"]) for line in counted), stops)
 
     def __add__(self, other: GateHours) -> GateHours:
-        """Return both together."""
         return GateHours(self.trials + other.trials, self.active + other.active, self.stops + other.stops)
 
     @property
@@ -131,11 +130,7 @@ def trials_csv(records: Sequence[TrialRecord]) -> str:
 
 
 def section(folder: Path, latex: bool = False) -> str:
-    """Return the Markdown of one run folder, or its LaTeX, in which all but the tables is a comment.
-
-    Raises:
-        ConfigError, OutputError: see `run_results`.
-    """
+    """Return the Markdown of a run folder, or LaTeX with all but tables as comment. Raises as `run_results` does."""
     records = finished_records(folder)
     commits = list(dict.fromkeys(record.commit for record in records))
     if len(commits) > 1:
@@ -163,11 +158,7 @@ def section(folder: Path, latex: bool = False) -> str:
 
 
 def gate_hours(folder: Path) -> GateHours:
-    """Return what the gates of a run folder did; nothing for a rung that provokes stops.
-
-    Raises:
-        OutputError: its file is no trial record.
-    """
+    """Return what the gates of a run folder did, nothing if provoked. Raises OutputError: it has no trial records."""
     records = read_records(folder / "trials.jsonl")
     if not records or make_rung(RUNGS[records[0].rung], records[0].options).provokes:
         return GateHours()

@@ -46,18 +46,13 @@ class StopRule:
     score: str = ""
 
     def __post_init__(self) -> None:
-        """Check the margin."""
         if not 0.0 < self.margin < 1.0:
             raise ConfigError(f"--margin is {self.margin:g}; it is a share between 0 and 1, e.g. 0.1.")
         if self.comparisons < 1:
             raise ConfigError(f"--comparisons is {self.comparisons}; it must be 1 or more.")
 
     def values(self, trials: Sequence[TrialOutcome] | Sequence[TrialRecord]) -> Array:
-        """Return what is compared of each trial, between 0 and 1.
-
-        Raises:
-            ConfigError: the score is no share.
-        """
+        """Return what is compared of each trial, between 0 and 1. Raises ConfigError: the score is no share."""
         found = np.array([t.series.get(self.score, 0.0) if self.score else float(t.success) for t in trials])
         if len(found) and not (0.0 <= found.min() and found.max() <= 1.0):
             raise ConfigError(f"The score '{self.score}' is not between 0 and 1 in every trial; name a share.")
@@ -100,7 +95,6 @@ class Decision:
     """Two sides, as they stand.
 
     Attributes:
-        a, b: the sides.
         n: pairs.
         difference: confidence sequence's interval of a minus b.
         p: p-value that holds at any time.
@@ -163,7 +157,6 @@ def sequential_tables(rates: Mapping[str, Array], found: Sequence[Decision], rul
 
     Args:
         rates: name of a row -> what was measured of its trials.
-        found: comparisons.
         rule: by which trials were ended.
     """
     rows = [

@@ -27,14 +27,11 @@ class Distribution:
     """What is quoted of `n` values, in their unit.
 
     Attributes:
-        n: how many.
         mean, mean_interval: with its 95 % interval, see `mean_interval`.
         median, median_interval: with the 95 % interval between two of the values, which assumes no distribution;
             None for fewer than six.
         q1, q3: quartiles (linear interpolation).
-        rms: root mean square.
         p95_size: 95 % quantile of the absolute values.
-        minimum, maximum: extremes.
     """
 
     n: int

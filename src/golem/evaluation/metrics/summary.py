@@ -18,14 +18,7 @@ from golem.package_data import load_data
 
 @dataclass(frozen=True, slots=True)
 class Metric:
-    """How one scalar is shown.
-
-    Attributes:
-        label: its name in words.
-        unit: the unit it is shown in.
-        scale: that unit per SI unit.
-        signed: whether it may be negative.
-    """
+    """How one scalar is shown: `scale` is its unit per SI unit, `signed` whether it may be negative."""
 
     label: str
     unit: str = ""
@@ -74,7 +67,6 @@ class MethodSummary:
     """One method under one case of a rung.
 
     Attributes:
-        method: its name.
         case: the condition, empty on most rungs.
         n, successes: trials.
         interval: Wilson 95 % interval of the success rate.
@@ -116,8 +108,6 @@ class Comparison:
     """Two methods on the same trials.
 
     Attributes:
-        a, b: the methods.
-        case: the condition.
         table: paired counts.
         difference: 95 % interval of the success rate of `a` minus that of `b`.
         p: two-sided exact McNemar p-value.

@@ -149,11 +149,7 @@ def _box(numbers: Array, points: tuple[int, int], where: str) -> Array:
 
 
 def read_labelled(folder: Path) -> list[LabelledImage]:
-    """Return the images of a folder in COCO format, where it has such a JSON file, or in YOLO's.
-
-    Raises:
-        ConfigError: it is neither.
-    """
+    """Return the images of a folder in COCO format, where it is, or YOLO's. Raises ConfigError: it is neither."""
     folder = folder.expanduser()
     if not folder.is_dir():
         raise ConfigError(f"There is no folder {folder}.")

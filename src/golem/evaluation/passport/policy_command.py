@@ -57,11 +57,7 @@ ALIKE = 0.02
 
 
 def sizes(passport: Passport) -> Iterator[Mistake]:
-    """Yield where the network does not fit the description; nothing else can be tried then.
-
-    Raises:
-        ConfigError: there is no such network.
-    """
+    """Yield where the network does not fit the description, which ends it. Raises ConfigError: no such network."""
     path, d = passport.network, passport.description
     if path.suffix not in LOADERS or not path.is_file():
         raise ConfigError(f"There is no network {path}; give its path with --network.")

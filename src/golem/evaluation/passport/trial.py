@@ -166,14 +166,7 @@ class Trial:
 
 
 def walk(floor: Floor, description: Description, network: Network, only: Twist | None = None) -> Trial:
-    """Let the policy stand and walk.
-
-    Args:
-        floor: the robot; begins anew.
-        description: what is said of the policy.
-        network: its network; begins anew.
-        only: walk at this twist only.
-    """
+    """Let the policy of `network` stand and walk on `floor`, both from anew, at the twist `only` if given."""
     e = description.envelope
     asked = [e.clamp(twist) for twist in (TWISTS if only is None else (only,))]
     twists = [Twist(), *[t for t in asked if t != Twist()]]

@@ -5,7 +5,8 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Literal
@@ -13,7 +14,7 @@ from typing import Annotated, Literal
 import numpy as np
 from tyro.conf import Positional, arg
 
-from golem.errors import ConfigError, unknown_name
+from golem.errors import ConfigError, shorten, unknown_name
 from golem.evaluation.base import RUNGS, case_name, make_rung
 from golem.evaluation.harness.records import TrialRecord, read_records
 from golem.evaluation.metrics.prediction_powered import prediction_powered
@@ -54,7 +55,6 @@ class RealRow:
         stat: `count`: `value` of `n` trials were won; `trial`: one was (1) or was not (0); `mean` or `median` of `n`.
         value, n, sd: the figure, how many trials, and the standard deviation of a mean; None where nobody says.
         index: of the twin's trial that a `trial` repeats; None where it repeats none.
-        source: in words.
     """
 
     rung: str
@@ -79,8 +79,8 @@ class RealRow:
         if success != counted:
             valid = "count or trial" if success else "mean or median"
             return f"the stat of '{self.metric}' is {valid}, not '{self.stat}'"
-        if not 1 <= self.n <= 10**6 or (self.index or 0) < 0:
-            return "n is a number from 1 to a million, and an index none below 0"
+        if not 1 <= self.n <= (1 if self.stat == "trial" else 10**6) or (self.index or 0) < 0:
+            return "n is a number from 1 to a million, 1 of a trial, and an index none below 0"
         if success and not (float(self.value).is_integer() and 0 <= self.value <= self.n):
             return f"{self.value:g} of {self.n} successes cannot be; that is a whole number from 0 to {self.n}"
         if self.sd is not None and (self.stat != "mean" or self.n < 2 or self.sd <= 0.0):
@@ -89,19 +89,20 @@ class RealRow:
 
 
 def read_real(path: str) -> list[RealRow]:
-    """Read a CSV; `paper` is the paper's own rows.
-
-    Raises:
-        ConfigError: it cannot be read, lacks a column, or a line says what cannot be; names the line.
-    """
+    """Read a CSV; `paper` is the paper's rows. Raises ConfigError: unreadable, no column, or a wrong line; names it."""
     try:
         text = (SHIPPED / "paper.csv" if path == "paper" else Path(path)).read_text(encoding="utf-8-sig")
-        lines = list(csv.DictReader(io.StringIO(text, newline=""), restkey="", restval="", strict=True))
+        table = csv.DictReader(io.StringIO(text, newline=""), None, "", "", strict=True, skipinitialspace=True)
+        lines, columns = list(table), list(table.fieldnames or ())
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise ConfigError(f"{path} cannot be read as CSV: {error}.") from error
     if not lines:
         raise ConfigError(f"{path} has no line of trials; golem real --template FILE writes one to begin with.")
-    return [_row(f"line {k} of {path}", line) for k, line in enumerate(lines, start=2)]
+    valid = {f.name for f in fields(RealRow)}
+    if len(columns) != len(valid & {*columns}):
+        said, names = shorten(", ".join(columns)), ", ".join(sorted(valid))
+        raise ConfigError(f"The first line of {path} is '{said}'; it names {names}, each once, with commas between.")
+    return [_row(f"line {k} of {path}", line) for k, line in enumerate(lines, start=2) if any(line.values())]
 
 
 def _row(where: str, line: dict[str, str]) -> RealRow:
@@ -114,12 +115,17 @@ def _row(where: str, line: dict[str, str]) -> RealRow:
     check_finite(f"The value in {where}", np.array([row.value, row.sd or 0.0]))
     if row.rung not in RUNGS:
         raise unknown_name(f"rung in {where}", row.rung, RUNGS)
-    methods = make_rung(RUNGS[row.rung]).methods()
+    methods = _methods(row.rung)
     if row.method not in (*methods, "GGX-F") and ":" not in row.method and not row.method.startswith("{"):
         raise unknown_name(f"method in {where}", row.method, methods)
     if problem := row.problem():
         raise ConfigError(f"In {where}, {problem}.")
     return row
+
+
+@cache
+def _methods(rung: str) -> Sequence[str]:
+    return make_rung(RUNGS[rung]).methods()
 
 
 def run_real(config: RealConfig) -> int:
@@ -130,6 +136,8 @@ def run_real(config: RealConfig) -> int:
         golem.errors.OutputError: records cannot be read, or the template not be written.
     """
     if config.template is not None:
+        if config.template.exists():
+            raise ConfigError(f"{config.template} is there already; choose another name.")
         print(f"Wrote {write_file(config.template, (SHIPPED / 'template.csv').read_text('utf-8'))}.")
         return 1
     rows, twins = read_real(config.file), list[TrialRecord]()
@@ -141,13 +149,13 @@ def run_real(config: RealConfig) -> int:
     profiles = sorted({record.profile for record in twins})
     if len(profiles) > 1:
         raise ConfigError(f"The runs are of the profiles {' and '.join(profiles)}; give those of one.")
-    singles = {row.cell: [r for r in rows if r.stat == "trial" and r.cell == row.cell] for row in rows}
+    singles: dict[tuple[str, str, str], list[RealRow]] = {row.cell: [] for row in rows}
+    for row in rows:
+        singles[row.cell] += [row] if row.stat == "trial" else []
     cells = [row for row in rows if row.stat != "trial"]
     for mine in filter(None, singles.values()):
-        one = mine[0]
-        cells.append(
-            RealRow(one.rung, one.method, SUCCESS, "count", sum(r.value for r in mine), len(mine), case=one.case)
-        )
+        one, won = mine[0], sum(r.value for r in mine)
+        cells.append(RealRow(one.rung, one.method, SUCCESS, "count", won, len(mine), case=one.case))
     lines = [compared(row, singles[row.cell], twins) for row in cells]
     columns = ("rung", "method", "case", "figure", "real", "twin", "predicted", "verdict", "real rate [%]", "with twin")
     note = (

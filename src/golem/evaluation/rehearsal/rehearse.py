@@ -61,7 +61,6 @@ class MiswiredTwinConfig(MujocoConfig):
     fault: str = "none"
 
     def __post_init__(self) -> None:
-        """BringupStep the options."""
         super().__post_init__()
         if self.fault not in FAULTS:
             raise unknown_name("fault of a bring-up", self.fault, FAULTS)
@@ -79,12 +78,10 @@ class MiswiredTwin(MujocoRobot):
             self.calibration = {name: T for name, T in self.calibration.items() if name != "head"}
 
     def joints(self) -> tuple[Array, Array, Array]:
-        """Return q, dq, tau as they are reported; see `Robot`."""
         q, dq, tau = super().joints()
         return reported(self._fault, q), reported(self._fault, dq), reported(self._fault, tau)
 
     def imu(self) -> Imu:
-        """Return the present IMU sample; see `Robot`."""
         sample = super().imu()
         if self._fault != "tilted_imu":
             return sample
@@ -279,11 +276,7 @@ def rehearse(config: BringupConfig, fault: str) -> bool:
 
 
 def _wait_for_robot(dds: DdsConfig) -> None:
-    """Wait until the twin is there; a busy machine takes its time to start one.
-
-    Raises:
-        RosError: it never came.
-    """
+    """Wait until the twin is there; a busy machine takes its time to start one. Raises RosError: it never came."""
     with member("rehearsal", dds) as (participant, node):
         link = RobotLink(participant, node, dds)
         if not link.spin(START, lambda: len(link.states) > 100):

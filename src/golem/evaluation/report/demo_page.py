@@ -23,8 +23,6 @@ class PickRecord:
     Attributes:
         success: whether a further screw lies in the tray, by the simulator's truth.
         screw: the screw that came into the tray, or None.
-        stage: where the skill ended.
-        reason: what the skill said at its end.
         start, seconds: when it began and how long it took, in robot time [s].
         stages: each stage with its duration [s].
     """

@@ -129,11 +129,7 @@ def time_plot(name: str, grouped: Mapping[str, Sequence[TrialRecord]]) -> str:
 
 
 def standalone_figures(records: Sequence[TrialRecord]) -> dict[str, str]:
-    """Return the figures of a run by name, each as the text of an SVG file.
-
-    Raises:
-        MissingExtra: matplotlib is not installed.
-    """
+    """Return the figures of a run by name, as texts of SVG files. Raises MissingExtra: without matplotlib."""
     methods = tuple(dict.fromkeys(record.method for record in records))
     rung = make_rung(RUNGS[records[0].rung], records[0].options)
     grouped = {method: [r for r in records if r.method == method] for method in methods}
@@ -165,11 +161,7 @@ if TYPE_CHECKING:
 
 
 def render(result: LadderResult) -> str:
-    """Return the report of a finished ladder as HTML.
-
-    Raises:
-        golem.errors.MissingExtra: what draws it is not installed.
-    """
+    """Return the report of a finished ladder as HTML. Raises MissingExtra: what draws it is not installed."""
     config, summary, records = result.config, result.summary, result.records
     first, rung = records[0], make_rung(RUNGS[config.rung], records[0].options)
     grouped = {method: [r for r in records if r.method == method] for method in summary.methods}

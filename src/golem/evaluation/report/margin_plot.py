@@ -23,7 +23,6 @@ class MarginBox:
     """The trials of one box.
 
     Attributes:
-        name: in words.
         margins: mean CoM margin of each trial [m].
         outside: trials whose margin was below zero at any time.
         colour: number of the method's colour.

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from golem.errors import MissingExtra
+from golem.errors import needs
 from golem.evaluation.metrics.statistics import wilson
 from golem.evaluation.metrics.text_table import short_names
 from golem.figures import blank_figure
@@ -21,15 +21,9 @@ from golem.robots.worlds.conditions import CHOICES, RANGES, Conditions
 
 
 def render_page(template: str, facts: dict[str, str], **values: Any) -> str:
-    """Return the page that a template of `templates/` makes of `values`, with `facts` of its provenance at the end.
-
-    Raises:
-        MissingExtra: jinja2 is not installed.
-    """
-    try:
+    """Return the page that a template makes of `values`, `facts` at its end. Raises MissingExtra: no jinja2."""
+    with needs("jinja2", "report"):
         import jinja2  # noqa: F401
-    except ImportError as error:
-        raise MissingExtra("jinja2", "report") from error
     return _pages().get_template(template).render(css=style(), facts=facts, **values)
 
 
@@ -67,15 +61,9 @@ def cause_colour(i: int) -> str:
 
 
 def styled() -> Any:
-    """Return the context in which figures of the page are drawn.
-
-    Raises:
-        MissingExtra: matplotlib is not installed.
-    """
-    try:
+    """Return the context in which figures of the page are drawn. Raises MissingExtra: matplotlib is not installed."""
+    with needs("matplotlib", "report"):
         import matplotlib
-    except ImportError as error:
-        raise MissingExtra("matplotlib", "report") from error
     return matplotlib.rc_context(_STYLE)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Hashable, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -19,7 +20,7 @@ from golem.evaluation.episodes.scripted_motion import ArmMotion, ScriptedMotion
 from golem.hardware.estimator.base import BaseEstimator
 from golem.interfaces import topics
 from golem.provenance import stack_facts
-from golem.robots.model.leg_dynamics import LEG, LegDynamics
+from golem.robots.model.leg_kernel import LEG, LegDynamics
 from golem.robots.mujoco.shoves import DIRECTIONS, shove
 from golem.runtime.contract_check import ContractCheck
 from golem.stack import Choice
@@ -81,13 +82,7 @@ def twist_at(t: float) -> Twist:
 
 
 def record(episode: Episode, spec: TrialSpec, pushed: bool) -> RecordedWalk:
-    """Let a robot walk, its arms moving, record and close it.
-
-    Args:
-        episode: the robot.
-        spec: the draws.
-        pushed: with one shove per segment, all directions in turn.
-    """
+    """Let a robot walk, arms moving, record and close it; `pushed` is with one shove per segment, from all sides."""
     truth = episode.robot.truth
     T_odom_world = np.linalg.inv(truth.T_world_odom)
     states: list[LowState] = []
@@ -115,7 +110,7 @@ def record(episode: Episode, spec: TrialSpec, pushed: bool) -> RecordedWalk:
         now = look()
         return False
 
-    try:
+    with closing(episode):
         episode.start(ScriptedMotion(ArmMotion(spec.rng("arms")), twist_at))
         episode.run(START, sample)
         for i in range(len(TWISTS) + 1):
@@ -124,8 +119,6 @@ def record(episode: Episode, spec: TrialSpec, pushed: bool) -> RecordedWalk:
                 episode.push(shove(DIRECTIONS[(i + spec.index) % len(DIRECTIONS)], SHOVE))
             episode.run(SEGMENT - 0.5, sample)
         loss = episode.loss
-    finally:
-        episode.close()
     judged = np.cumsum(free) * TICK > 1.0
     if loss is not None:
         judged[-round(1.0 / TICK) :] = False

@@ -235,7 +235,6 @@ class FetchRung(KitchenRung[FetchOptions]):
     def errand(
         self, spec: TrialSpec, running: LockstepRunner, robot: MujocoRobot, kitchen: KitchenLayout, oracle: Oracle
     ) -> Errand:
-        """Have one thing fetched; see `KitchenRung`."""
         kind, _, (x, y) = draw_errand(spec, kitchen)
         at = running.stack.choice("robot").options.get("stance", (0.0, 0.0, 0.0))
         place = x + float(at[0]), y + float(at[1])

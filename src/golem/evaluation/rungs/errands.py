@@ -22,16 +22,18 @@ from golem.errors import unknown_name
 from golem.evaluation.base import DONE, Case, Results, TrialSpec
 from golem.evaluation.episodes.counter_watch import LIFTED, CounterWatch, ErrandWatch
 from golem.evaluation.episodes.oracle import Oracle, whereabouts
-from golem.evaluation.rungs.counter import AREA, FREE, LOOK, radius
+from golem.evaluation.rungs.counter import ACROSS, AREA, FREE, LOOK, TIGHT, radius
 from golem.evaluation.rungs.kitchen_rung import Errand, KitchenRung, Verdict
+from golem.evaluation.rungs.pick_screw import SLOT, doable
 from golem.package_data import load_data
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.worlds.conditions import LayoutKind
 from golem.robots.worlds.kitchen import KitchenLayout, StandingThing
 from golem.runtime.lockstep import LockstepRunner
 from golem.skills.base import SkillResult
+from golem.skills.search import SearchGoal
 from golem.stack import Stack, load_stack
-from golem.types import Array
+from golem.types import SIDES, Array
 
 SUITE: Mapping[str, Mapping[str, Any]] = load_data(__package__, "errands.yaml")
 """What is asked, by the name of the errand."""
@@ -40,6 +42,8 @@ SPOTS = 400
 """Places that are drawn for a thing that is put elsewhere; the one with the most room is taken."""
 NEAR = 0.08
 """How far a place that was told may be off [m]."""
+AWAY = 0.25
+"""Least distance by which a thing is put elsewhere [m]: a memory takes what head cameras are off by for no move."""
 BESIDE = (14, 16, 18, 20, 25, 30)
 """How far beside each other things are asked for [cm]."""
 
@@ -59,18 +63,19 @@ class Asked:
 
     def __init__(self, spec: TrialSpec, robot: MujocoRobot, kitchen: KitchenLayout, shift: Array) -> None:
         """Draw what is meant; the area that is reached is shifted by (2,) `shift` in the world [m]."""
-        self.rng, self._robot, self._shift = spec.rng("errand"), robot, shift
+        self.rng, self._robot, self._shift = spec.rng(f"errand {spec.case['errand']}"), robot, shift
         order = [kitchen.things[k] for k in self.rng.permutation(len(kitchen.things))]
-        self.things, self.a, self.b = order, order[0], order[1]
-        self.cm, self.way, self.beside = BESIDE[-1], "left", self.at(order[1])
         pairs = [(a, b) for a in order for b in order if a is not b]
+        one_hand = ((a, b) for a, b in pairs if self._one_hand(self.at(a), self.at(b)))
+        self.things, (self.a, self.b) = order, next(one_hand, pairs[0])
+        self.cm, self.way, self.beside = BESIDE[-1], "left", self.at(self.b)
         for a, b, cm, sign in ((a, b, cm, s) for a, b in pairs for cm in BESIDE for s in (1, -1)):
             spot = self.at(b) + (0.0, 0.01 * sign * cm)
-            if self._reached(spot) and self.room(spot, a) > FREE:
+            if self._reached(spot) and self.room(spot, a) > FREE and self._one_hand(self.at(a), spot):
                 self.pair, self.cm, self.way, self.beside = (a, b), cm, "left" if sign > 0 else "right", spot
                 break
         else:
-            self.pair = order[0], order[1]
+            self.pair = self.a, self.b
         self.first = {thing.body: self.at(thing) for thing in order}
 
     def at(self, thing: StandingThing) -> Array:
@@ -81,6 +86,10 @@ class Asked:
         low, high = np.array(AREA).T
         return bool((low <= spot - self._shift).all() and (spot - self._shift <= high).all())
 
+    def _one_hand(self, here: Array, there: Array) -> bool:
+        """Return whether the hand on the side of (2,) `here` is asked to go as far as (2,) `there`."""
+        return math.copysign(1.0, here[1] - self._shift[1]) * float(there[1] - self._shift[1]) > -ACROSS
+
     def room(self, spot: Array, one: StandingThing) -> float:
         """Return how much room a thing would have at (2,) `spot` beside the others [m]."""
         others = [each for each in self.things if each is not one]
@@ -90,11 +99,13 @@ class Asked:
         """Put a thing where the most room is, also from where it and the others stood at first."""
         low, high = np.array(AREA).T
         spots = self.rng.uniform(low, high, (SPOTS, 2)) + self._shift
-        widest = 2.0 * max(radius(each) for each in self.things)
+        widest, origin = 2.0 * max(radius(each) for each in self.things), self.first[one.body]
 
         def fit(spot: Array) -> float:
+            if not self._one_hand(spot, origin) or self.room(spot, one) < TIGHT:
+                return -math.inf
             left = min(float(np.linalg.norm(spot - at)) for at in self.first.values()) - widest
-            return min(self.room(spot, one), left, FREE)
+            return min(self.room(spot, one), left, float(np.linalg.norm(spot - origin)) - AWAY, FREE)
 
         joint = self._robot.scene.model.joint(one.body).qposadr[0]
         self._robot.data.qpos[joint : joint + 2] = max(spots, key=fit)
@@ -113,7 +124,6 @@ class ErrandsRung(KitchenRung[ErrandsOptions]):
     stack_name = "counter-tether"
 
     def suits(self, robot: MujocoRobot) -> bool:
-        """Return whether a twin has what the rung is about; see `KitchenRung`."""
         return True
 
     def cases(self, results: Results) -> Sequence[Case]:
@@ -134,7 +144,6 @@ class ErrandsRung(KitchenRung[ErrandsOptions]):
     def errand(
         self, spec: TrialSpec, running: LockstepRunner, robot: MujocoRobot, kitchen: KitchenLayout, oracle: Oracle
     ) -> Errand:
-        """Have one errand done; see `KitchenRung`."""
         said = SUITE[str(spec.case["errand"])]
         if robot.scene.kitchen is None:
             return self._screws(said, running, robot, oracle)
@@ -146,6 +155,8 @@ class ErrandsRung(KitchenRung[ErrandsOptions]):
         for step in said.get("before", ()):
             if step == "look":
                 running.execute("remember", LOOK)
+            elif "find" in step:
+                running.execute("search", SearchGoal(getattr(asked, step["find"]).kind))
             elif "away" in step:
                 asked.away(getattr(asked, step["away"]))
             else:
@@ -159,6 +170,7 @@ class ErrandsRung(KitchenRung[ErrandsOptions]):
         report, result = self._done(words, running, robot, watch)
 
         def judge() -> Verdict:
+            slot = "localizer" if "count" in judged else "memory" if "told" in judged else SLOT
             if "count" in judged:
                 fine, why = report.facts.get("count") == count, f"There are {count}."
             elif "held" in judged:
@@ -169,18 +181,22 @@ class ErrandsRung(KitchenRung[ErrandsOptions]):
                 off = math.dist(_in_world(running, robot, report.facts.get("place")), there)
                 fine, why = off < NEAR, f"The place that was said is {1e2 * off:.0f} cm off."
             else:
-                spot = asked.beside if judged["at"] == "beside" else asked.first[getattr(asked, judged["at"]).body]
-                problem = watch.problem((float(spot[0]), float(spot[1])))
+                place = asked.beside if judged["at"] == "beside" else asked.first[getattr(asked, judged["at"]).body]
+                spot = float(place[0]), float(place[1])
+                problem = watch.problem(spot)
                 fine, why = problem is None, problem or ""
-            return Verdict(fine, f"'{words}': {report.text} {why}", {})
+                # A hand that sets a thing down where the robot meant to is not to blame for what it remembers.
+                if watch.astray(spot) and math.dist(_in_world(running, robot, report.facts.get("place")), spot) > NEAR:
+                    slot = "memory"
+            return Verdict(fine, f"'{words}': {report.text} {why}", {}, slot)
 
         return Errand(result, watch, judge)
 
     def _screws(self, said: Mapping[str, Any], running: LockstepRunner, robot: MujocoRobot, oracle: Oracle) -> Errand:
         """Have screws taken out; what was told of tight ones has to be so."""
-        fasteners = oracle.fasteners()
-        sides = {side: [f for f in fasteners if f.loose and (f.in_base[1] > 0.0) == (side == "left")]
-                 for side in ("left", "right")}  # fmt: skip
+        fasteners, drops = oracle.fasteners(), oracle.drop_places()
+        able = [f for f in fasteners if f.loose and doable([f], drops)]
+        sides = {side: [f for f in able if (f.in_base[1] > 0.0) == (side == "left")] for side in SIDES}
         side = max(sides, key=lambda name: len(sides[name]))
         words = said["words"].format(n=len(sides[side]), side=side)
         wanted = said["judge"]["screws"] or len(sides[side])
@@ -206,9 +222,9 @@ class ErrandsRung(KitchenRung[ErrandsOptions]):
         with TemporaryDirectory() as folder, closing(AuditLog(Path(folder) / "audit.jsonl")) as log:
             desk = Desk(StackBody(running, robot, watch=watch), RULES, log)
             report = SentencePlanner(desk.call).do(words)
-        stage = DONE if report.done else "errand"
         timings = {"total": running.executor.t - start}
-        return report, SkillResult(report.done, stage, None if report.done else "skill", report.text, timings)
+        stage, slot = (DONE, None) if report.done else (report.stage, report.slot)
+        return report, SkillResult(report.done, stage, slot, report.text, timings)
 
 
 def _in_world(running: LockstepRunner, robot: MujocoRobot, place: Sequence[float] | None) -> tuple[float, float]:

@@ -55,11 +55,7 @@ GROUPS = {NOTHING: (), "stops": tuple(STOPS), "bounds": tuple(BOUNDS)}
 
 
 def lifted(limits: SafetyLimits, names: str) -> SafetyLimits:
-    """Return `limits` without those that `names` says, e.g. `stops+slew`.
-
-    Raises:
-        ConfigError: there is no such limit.
-    """
+    """Return `limits` without those of `names`, e.g. `stops+slew`. Raises ConfigError: there is no such limit."""
     single = STOPS | BOUNDS
     for name in names.split("+"):
         if name not in GROUPS and name not in single:

@@ -47,7 +47,6 @@ class Verdict:
     Attributes:
         done: whether it is as it was asked for.
         words: what is not, in a sentence.
-        series: figures of it.
         slot: what is to blame where the robot says that it is done, and it is not.
     """
 
@@ -143,11 +142,7 @@ class KitchenRung(Rung[O]):
         return TrialOutcome(False, stage, module, detail, timings, series, picture, result.trace)
 
     def make_stack(self, method: str, profile: str, overrides: Mapping[str, str]) -> Stack:
-        """Return the stack of a trial.
-
-        Raises:
-            ConfigError: an override replaces what the rung compares, or is none.
-        """
+        """Return the stack of a trial. Raises ConfigError: an override replaces what the rung compares, or is none."""
         if self.slot in overrides or "robot" in overrides:
             raise ConfigError(
                 f"The method is what sits in {self.slot}, and the {self.subject} is the rung's; leave out --use "

@@ -53,11 +53,7 @@ class LegRung(Rung[O]):
     facts: Mapping[str, object] = {}
 
     def _each(self, *options: str) -> None:
-        """Check options that name several things.
-
-        Raises:
-            ConfigError: one names nothing, or something twice.
-        """
+        """Check options that name several things. Raises ConfigError: one names nothing, or something twice."""
         for option in options:
             names = getattr(self.options, option)
             if not names or len(set(names)) < len(names):

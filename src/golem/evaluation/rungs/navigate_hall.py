@@ -16,8 +16,8 @@ import numpy as np
 from golem.capabilities.navigation.map_picture import GOAL, TRACK, WAY, MapPicture
 from golem.capabilities.navigation.movers import BODY
 from golem.evaluation.base import DONE, Rung, TrialOutcome, TrialSpec
-from golem.evaluation.episodes.contacts import ContactWatch
 from golem.evaluation.episodes.episode import Episode, Loss, episode_seed, legs_stack
+from golem.evaluation.episodes.oracle import ContactWatch
 from golem.evaluation.episodes.survey import survey
 from golem.interfaces import topics
 from golem.interfaces.nav_payloads import NavStep

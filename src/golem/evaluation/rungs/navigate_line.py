@@ -10,9 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from golem.evaluation.base import DONE, TrialOutcome, TrialSpec
-from golem.evaluation.episodes.episode import Episode, Loss
-from golem.evaluation.episodes.film_strip import FilmStrip
-from golem.evaluation.episodes.simulated_odometry import SimulatedOdometry
+from golem.evaluation.episodes.episode import Episode, Loss, SimulatedOdometry
+from golem.evaluation.episodes.last_seconds import FilmStrip
 from golem.evaluation.rungs.leg_rung import NO_WALKER, LegRung, PlantOptions
 from golem.interfaces import topics
 from golem.robots.mujoco.balance import TRACE
@@ -44,7 +43,7 @@ class NavigateLine(LegRung[LineOptions]):
     """Walk 6 m straight ahead over the open floor, by odometry; the error is that of the true pose.
 
     No LiDAR odometry takes part: the robot goes by its base estimator, to whose pose a noise of 1 cm and 1 deg is
-    added (`golem.evaluation.episodes.simulated_odometry`, source `estimator`). The drift of legs and IMU over the line
+    added (`golem.evaluation.episodes.episode`, source `estimator`). The drift of legs and IMU over the line
     is in the error.
     """
 

@@ -40,12 +40,7 @@ class WalkBag:
     """One bag. Times are the robot's: log times begin where the walk does."""
 
     def __init__(self, folder: Path, walk: lidar_walk.LidarWalk) -> None:
-        """Begin the bag `folder` for `walk`.
-
-        Raises:
-            MissingExtra: the extra `record` is not installed.
-            OutputError: the folder exists, or cannot be written.
-        """
+        """Begin the bag `folder` for `walk`. Raises MissingExtra, OutputError: there can be no such bag."""
         kinds = {name: public.topic(name).type for name in public.LIDAR}
         self._topics = {name: topic(name, kind) for name, kind in {**kinds, "/odom": ODOMETRY, TRUTH: ODOMETRY}.items()}
         self._walk, self._legs = walk, 0
@@ -53,11 +48,7 @@ class WalkBag:
         self._writer = BagWriter(folder, BagConfig(compression="zstd"), about)
 
     def write(self, reading: LidarImu | LegOdometry | LidarScan) -> None:
-        """Write one reading; with the legs goes what is true.
-
-        Raises:
-            OutputError: it cannot be written.
-        """
+        """Write one reading; with the legs goes what is true. Raises OutputError: it cannot be written."""
         if isinstance(reading, LidarImu):
             self._write("/livox/imu", lidar_convert.imu(reading), reading.t)
         elif isinstance(reading, LidarScan):
@@ -99,7 +90,6 @@ class Condition:
         ate: absolute trajectory error up to which it is a success [m].
         end: error at the end up to which it is one [m].
         share: the same as a share of the way.
-        people: how many walk about.
         dropout: share of the points that is lost; None: the profile's.
         mount: angle by which the LiDAR is turned on its mount [rad]; None: the profile's draw.
         gap: times between which no scan comes [s].
@@ -230,12 +220,7 @@ def readings(walk: lidar_walk.LidarWalk, spec: TrialSpec) -> Iterator[Reading]:
 
 
 def kept(heard: Iterator[Reading], walk: lidar_walk.LidarWalk, folder: Path) -> Iterator[Reading]:
-    """Yield what was `heard`, and write it into a bag.
-
-    Raises:
-        MissingExtra: the extra `record` is not installed.
-        OutputError: it cannot be written.
-    """
+    """Yield what was `heard`, and write it to a bag. Raises MissingExtra, OutputError: there can be no bag."""
     with closing(WalkBag(folder, walk)) as bag:
         for reading in heard:
             bag.write(reading)

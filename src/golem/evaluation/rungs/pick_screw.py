@@ -7,6 +7,7 @@ that `golem compare` of two runs says what balancing costs.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import closing
 from dataclasses import asdict, dataclass, replace
 from functools import cache, lru_cache
 from pathlib import Path
@@ -24,8 +25,7 @@ from golem.errors import ConfigError
 from golem.evaluation.base import DONE, Case, Outcomes, Results, Rung, TrialOutcome, TrialSpec
 from golem.evaluation.blame.oracles import with_modules
 from golem.evaluation.episodes.episode import HANGS, READY, Loss, episode_seed, lost
-from golem.evaluation.episodes.oracle import Oracle
-from golem.evaluation.episodes.pick_blame import blame
+from golem.evaluation.episodes.oracle import GraspTruth, Oracle
 from golem.evaluation.episodes.pick_claims import REFUSALS, Fastener, claims
 from golem.evaluation.episodes.pick_watch import PickTouches, PickWatch
 from golem.evaluation.harness.arguments import read_sweep
@@ -44,18 +44,39 @@ from golem.slots import KEYS
 from golem.stack import Stack, load_stack
 from golem.types import SIDES, Array, Side
 
+PAD_REACH = 0.008
+"""Half width of a finger pad [m]: a hand further off than this cannot hold the screw."""
+STRAIGHT = 0.087
+"""Tilt beyond which an extraction counts as off axis [rad]: 5 deg."""
+CALIBRATION = "calibration"
+"""Who is to blame where a camera is not where the robot's calibration has it: no module."""
+
+
+def blame(stage: str, slot: str | None, truth: GraspTruth | None, drop_inside: float | None = None) -> str | None:
+    """Return the slot that lost a failed trial.
+
+    Where the hand missed the screw, the larger of the two errors is to blame: where the camera had the screw, or what
+    was left from there to the hand (the arm and its calibration). The first is again the larger of two: the camera's
+    calibration, or what was seen (perception). Where it did not miss, an off-axis pull is the arm's; a hand that lets
+    go beside the tray, `drop_inside` [m] within its rim, was sent there by perception; and the rest is the grip's.
+    """
+    if truth is None or stage in ("detect", "servo", "safety", FAULT):
+        return slot
+    if truth.miss > PAD_REACH:
+        if truth.told < truth.left:
+            return "upper_body"
+        return CALIBRATION if truth.calibration > truth.seen else "localizer"
+    if stage == "extract" and truth.tilt > STRAIGHT:
+        return "upper_body"
+    return "localizer" if stage == "place" and drop_inside is not None and drop_inside < 0.0 else "grasp_method"
+
+
 SAID = "said_"
 """Begins the name of the figure that says how a pick ended, by its own word."""
 
 
 def verdict(said: PickReport, success: bool, doable: bool) -> dict[str, float]:
-    """Return how a trial ended, as figures.
-
-    Args:
-        said: what the pick reports.
-        success: whether a screw is in the tray.
-        doable: whether a hand reaches a loose screw and the tray.
-    """
+    """Return how a trial ended, as figures; `doable` is whether a hand reaches a loose screw and the tray."""
     series = {f"{SAID}{said.outcome}": 1.0, "doable": float(doable)}
     if said.outcome in REFUSALS and not success:
         series["refusal_right"] = float(not doable)
@@ -253,8 +274,7 @@ class PickRung(Rung[PickOptions]):
         running, robot = build(stack, episode_seed(spec.seed, spec.index))
         if self.onlooker is not None:
             self.onlooker(running, robot)
-        oracle = Oracle(robot)
-        try:
+        with closing(robot), closing(Oracle(robot)) as oracle:
             hangs = let_go(running, robot) if self.balances else None
             if hangs is not None:
                 return hangs
@@ -272,9 +292,6 @@ class PickRung(Rung[PickOptions]):
             right = claims(said, before, oracle.taken(before), in_tray, watch.looked_at)
             ended = verdict(said, outcome.success, feasible)
             return replace(outcome, series={**outcome.series, **touches.series(), **right, **ended})
-        finally:
-            oracle.close()
-            robot.close()
 
     def tables(self, outcomes: Outcomes) -> Sequence[TextTable]:
         """Return what the robot said at the end, against what was possible; see `Rung`."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from golem.evaluation.base import DONE, TrialOutcome, TrialSpec
 from golem.evaluation.episodes.episode import Episode, Loss
-from golem.evaluation.episodes.film_strip import FilmStrip
+from golem.evaluation.episodes.last_seconds import FilmStrip
 from golem.evaluation.episodes.scripted_motion import ArmMotion, ScriptedMotion
 from golem.evaluation.rungs.leg_rung import LegRung, PlantOptions
 from golem.robots.mujoco.balance import TRACE, BalanceTrace

@@ -136,11 +136,7 @@ Gait = tuple[Phase, str]
 
 
 def walk_twist(word: str) -> Twist:
-    """Return the twist that `word` of `--walk` means, e.g. `0.3` or `0.3,0,0.4`.
-
-    Raises:
-        ConfigError: it is no twist, or that of a robot that stands.
-    """
+    """Return the twist of a `word` of `--walk`, e.g. `0.3` or `0.3,0,0.4`. Raises ConfigError: none, or standing."""
     try:
         numbers = [float(number) for number in word.split(",")]
     except ValueError:

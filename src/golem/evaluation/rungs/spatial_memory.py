@@ -33,8 +33,6 @@ class ObjectTimeline:
     """One object at one place.
 
     Attributes:
-        name: for a person.
-        thing: its kind and place.
         present: whether it stands there, at each look.
         beliefs: one after each look.
         told: whether "where is it now?" was answered rightly after each look; None where it does not stand there, or no

@@ -17,9 +17,8 @@ from golem.capabilities.navigation.goto import GoTo
 from golem.errors import ConfigError
 from golem.evaluation.base import Case, Outcomes, Results, TrialOutcome, TrialSpec
 from golem.evaluation.blame.oracles import with_modules
-from golem.evaluation.episodes.contacts import ContactWatch
 from golem.evaluation.episodes.episode import Episode, Loss, episode_seed, lost
-from golem.evaluation.episodes.oracle import Oracle, place_error
+from golem.evaluation.episodes.oracle import ContactWatch, Oracle, place_error
 from golem.evaluation.episodes.pick_claims import claims
 from golem.evaluation.episodes.pick_watch import PickTouches, PickWatch
 from golem.evaluation.episodes.survey import survey

@@ -13,9 +13,8 @@ import numpy as np
 from golem.capabilities.legs.base import Envelope
 from golem.errors import unknown_name
 from golem.evaluation.base import TrialOutcome, TrialSpec
-from golem.evaluation.episodes.episode import Episode, Loss
+from golem.evaluation.episodes.episode import Episode, Loss, SimulatedOdometry
 from golem.evaluation.episodes.scripted_motion import ArmMotion, ScriptedMotion
-from golem.evaluation.episodes.simulated_odometry import SimulatedOdometry
 from golem.evaluation.rungs.leg_rung import LegRung, PlantOptions, can_walk, judged, no_walker
 from golem.provenance import stack_facts
 from golem.robots.mujoco.shoves import DIRECTIONS, shove

@@ -14,10 +14,9 @@ from typing import Any, Literal
 import numpy as np
 
 from golem.evaluation.base import DONE, Case, Outcomes, Results, TrialOutcome, TrialSpec
-from golem.evaluation.episodes.contacts import ContactWatch
 from golem.evaluation.episodes.episode import Episode, episode_seed
 from golem.evaluation.episodes.gantry_cell import GantryCell
-from golem.evaluation.episodes.oracle import Oracle, Whereabouts, whereabouts
+from golem.evaluation.episodes.oracle import ContactWatch, Oracle, Whereabouts, whereabouts
 from golem.evaluation.episodes.pick_watch import PickTouches
 from golem.evaluation.metrics.text_table import TextTable
 from golem.evaluation.rungs.pick_screw import SETTLE
@@ -175,9 +174,11 @@ def write_claims(
     """Write the list of a pack as a gantry would; return the place and the claim of each of its fasteners."""
     layout, loose, places = scene.layout, {draw.slot for draw in scene.draws}, scene.layout.fasteners()
     rows, claims, asked = list[str](), list[tuple[int, bool]](), asked_for(layout, options)
-    for tray in layout.trays():
+    trays = layout.trays()
+    apart = len({tray.kind for tray in trays}) > 1
+    for tray in trays:
         x, y, z, _ = np.linalg.inv(layout.pose()) @ (tray.x, tray.y, tray.z, 1.0)
-        rows.append(f"tray,{x:.4f},{y:.4f},{z:.4f},,")
+        rows.append(f"tray,{x:.4f},{y:.4f},{z:.4f},,,{tray.kind if apart else ''}")
     wrong = rng.random(len(places)) < options.wrong
     listed = places + options.place * rng.normal(size=places.shape)
     other = (rng.random(len(listed)) < options.kind) * rng.integers(1, len(KINDS), len(listed))
@@ -186,8 +187,8 @@ def write_claims(
             claimed = (slot in loose) != bool(wrong[slot]) and slot in asked
             claims.append((slot, claimed))
             kind = KINDS[(KINDS.index(layout.kind(slot)) + other[slot]) % len(KINDS)]
-            rows.append(f"{kind},{x:.4f},{y:.4f},{z + HEAD:.4f},{int(claimed)},{claim_name(slot)}")
-    file.write_text("\n".join(["class,x,y,z,loose,name", *rows]), encoding="utf-8")
+            rows.append(f"{kind},{x:.4f},{y:.4f},{z + HEAD:.4f},{int(claimed)},{claim_name(slot)},")
+    file.write_text("\n".join(["class,x,y,z,loose,name,takes", *rows]), encoding="utf-8")
     return claims
 
 

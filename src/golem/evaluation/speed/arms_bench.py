@@ -14,14 +14,13 @@ from rich.table import Table
 from golem.capabilities.arms.arm_kinematics import UpperKinematics
 from golem.capabilities.arms.goal_postures import GoalPostures
 from golem.capabilities.arms.postures import downward, posture
-from golem.capabilities.arms.trajectory import gate_limits
+from golem.capabilities.arms.trajectory import gate_limits, interpolate
 from golem.capabilities.collision.collision_model import CollisionModel
 from golem.capabilities.collision.link_poses import MeshOracle, joint_names
 from golem.capabilities.collision.obstacles import Obstacle, World
 from golem.capabilities.collision.pack_robot import our_robot
 from golem.capabilities.collision.sphere_robot import load_spheres
 from golem.capabilities.planning.base import ArmPlanner, Held, Plan, PlanRefused, PlanRequest
-from golem.capabilities.planning.hermite import interpolate
 from golem.capabilities.planning.joint_space import JointSpace, PlanningRobot
 from golem.capabilities.planning.path_planner import fine_points
 from golem.capabilities.planning.rrt_connect import RrtConnect, Straight
@@ -250,11 +249,7 @@ class ArmsBenchConfig(BenchOutput):
 
 
 def run_arms_bench(config: ArmsBenchConfig) -> list[Figure]:
-    """Measure and print.
-
-    Raises:
-        ConfigError: a number is out of range.
-    """
+    """Measure and print. Raises ConfigError: a number is out of range."""
     if config.postures < 9 or min(config.seed, config.plans) < 0:
         raise ConfigError("--postures must be 9 or more, --plans and --seed 0 or more.")
     robot = load_spheres()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable, Generator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import asdict, dataclass
 from functools import partial
 from itertools import count, product
@@ -50,7 +50,6 @@ class Figure:
     """One measured figure.
 
     Attributes:
-        name: what was measured.
         median, p99: over the repetitions; equal where there is one.
         unit: of both.
         reference: what it is compared with, and where that comes from.
@@ -88,11 +87,7 @@ class BenchConfig(BenchOutput):
 
 
 def run_bench(config: BenchConfig) -> list[Figure]:
-    """Measure and print.
-
-    Raises:
-        ConfigError: the seed is negative.
-    """
+    """Measure and print. Raises ConfigError: the seed is negative."""
     if config.seed < 0:
         raise ConfigError(f"--seed is {config.seed}; it must be 0 or more.")
     figures = [*_control(config), *_physics(config), *_perception(config), *_navigation(config), *_robot(config)]
@@ -195,7 +190,7 @@ def _perception(config: BenchConfig) -> list[Figure]:
     _, robot = build(load_stack("tether", profile="field"), config.seed)
     detector = OnnxDetector()
     figures = []
-    try:
+    with closing(robot):
         for camera in ("head", "right_hand"):
             info = robot.cameras[camera]
             size = f"{info.width}x{info.height}"
@@ -206,8 +201,6 @@ def _perception(config: BenchConfig) -> list[Figure]:
             frame = RgbdImage(0.0, info, rgb, depth, np.eye(4))
             times = timed(lambda i, frame=frame: detector.locate(frame, detector.classes), n)
             figures.append(figure(f"detector {camera} {size}", times, 1e3, "ms", "14.3 ms: 640x480, prototype"))
-    finally:
-        robot.close()
     return figures
 
 
@@ -220,12 +213,10 @@ def _robot(config: BenchConfig) -> list[Figure]:
     """Robot seconds per CPU second of a whole tethered pick, with and without what cameras and detector took."""
     with stopwatch(CameraNode) as cameras, stopwatch(LocalizerNode) as localizer:
         running, robot = build(load_stack("tether", profile="field"), config.seed)
-        try:
+        with closing(robot):
             start = time.process_time()
             running.execute("pick", PickGoal())
             whole = time.process_time() - start
-        finally:
-            robot.close()
     blind = running.executor.t / (whole - sum(cameras) - sum(localizer))
     seeing = running.executor.t / whole
     return [
@@ -261,11 +252,7 @@ WARM_UP = 500
 
 
 def gate_ticks(n: int) -> Array:
-    """Return the (n,) CPU times of ticks with a new state, command and base estimate each, in an active gate [s].
-
-    Raises:
-        GolemError: the gate did not stay active.
-    """
+    """Return the (n,) CPU times of ticks of an active gate with new frames each [s]. Raises GolemError: not active."""
     domain, clock = LocalDomain(), 0.0
     safety, robot = domain.participant(), domain.participant()
     limits, estop = SafetyLimits.from_profile(), VirtualEstop()
@@ -302,11 +289,7 @@ def gate_ticks(n: int) -> Array:
 
 
 def check_ticks(n: int) -> Array:
-    """Return the (n,) CPU times of the gate alone, with a new frame of each kind at every tick [s].
-
-    Raises:
-        GolemError: the gate did not stay active.
-    """
+    """Return the (n,) CPU times of the gate alone, with new frames at each tick [s]. Raises GolemError: not active."""
     gate, noise = Gate(), np.random.default_rng(0)
     q, zeros, up = start_posture(), np.zeros(NUM_JOINTS), np.array([1.0, 0.0, 0.0, 0.0])
     kp, kd = np.full(NUM_JOINTS, 100.0), np.full(NUM_JOINTS, 3.0)

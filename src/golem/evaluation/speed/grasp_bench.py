@@ -46,11 +46,7 @@ class GraspBenchConfig(BenchOutput):
 
 
 def run_grasp_bench(config: GraspBenchConfig) -> list[Figure]:
-    """Measure and print.
-
-    Raises:
-        ConfigError: a number is out of range, or a method does not exist.
-    """
+    """Measure and print. Raises ConfigError: a number is out of range, or a method does not exist."""
     if config.points < 50 or config.n < 1 or config.seed < 0 or config.noise < 0.0:
         raise ConfigError("--points must be 50 or more, --n 1 or more, --seed and --noise 0 or more.")
     console, figures = Console(), list[Figure]()
@@ -119,7 +115,6 @@ def cloud(thing: str, count: int, noise: float, rng: np.random.Generator) -> Loc
         thing: one of `KINDS`, or `handle`.
         count: points of it.
         noise: their standard deviation [m].
-        rng: draws them.
     """
     radius, height = (0.0125, 0.30) if thing == "handle" else KINDS[thing]
     angle, up = rng.uniform(0.0, 2.0 * np.pi, 8 * count), rng.uniform(0.0, 1.0, 8 * count)

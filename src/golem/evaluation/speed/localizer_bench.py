@@ -43,11 +43,7 @@ class LocalizerBenchConfig:
 
 
 def run_localizer_bench(config: LocalizerBenchConfig) -> dict[str, LabelScore]:
-    """Measure and print.
-
-    Raises:
-        ConfigError: the folder holds no such images, a label is not among theirs, or the localizer knows none.
-    """
+    """Measure and print. Raises ConfigError: no such images, or a label not theirs or not the localizer's."""
     if not 0.0 < config.overlap <= 1.0:
         raise ConfigError(f"--overlap is a share above 0 and up to 1, not {config.overlap:g}.")
     images = read_labelled(config.folder)

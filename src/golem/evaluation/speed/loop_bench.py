@@ -102,11 +102,7 @@ class Worker(AbstractContextManager["Worker", None]):
         )
 
     def ask(self, *words: object) -> Any:
-        """Return its answer to a request; see `loop_measure.main`.
-
-        Raises:
-            GolemError: it ended instead.
-        """
+        """Return its answer to a request; see `loop_measure.main`. Raises GolemError: it ended instead."""
         process = self._process
         assert process.stdin is not None and process.stdout is not None
         try:
@@ -122,7 +118,6 @@ class Worker(AbstractContextManager["Worker", None]):
         return json.loads(answer)
 
     def __exit__(self, *_: object) -> None:
-        """End the process."""
         self._process.kill()
         self._process.communicate()
         self._errors.close()

@@ -16,7 +16,7 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import closing, contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -198,13 +198,11 @@ def _trial(case: LoopCase, seed: int, probe: Probe) -> None:
         rung.run(TrialSpec(case.rung, case.method, "field", seed, 0, case=dict(case.case)), None)
         return
     running, robot = build(legs_stack(case.method, "field"), seed)
-    try:
+    with closing(robot):
         probe.begin(running, robot)
         run: Callable[..., None] = running.executor.run
         # Where an executor can be told so, nobody has to be asked after every tick.
         run(1e9, **({"due": lambda: 1e9} if "due" in inspect.signature(run).parameters else {}))
-    finally:
-        robot.close()
 
 
 def start_up() -> dict[str, float]:

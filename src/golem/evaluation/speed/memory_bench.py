@@ -38,7 +38,6 @@ class Room:
     """Objects on a square of the floor, 1 m apart, and looks from above at some of them."""
 
     def __init__(self, count: int, seed: int) -> None:
-        """Lay `count` objects out."""
         # A look is at one part of a row: both are multiples of its length.
         self._side, self._count = NEAR * max(1, round(np.sqrt(count) / NEAR)), count - count % NEAR
         self._rng = np.random.default_rng(seed)
@@ -64,11 +63,7 @@ class Room:
 
 
 def run_memory_bench(config: MemoryBenchConfig) -> list[Figure]:
-    """Measure and print.
-
-    Raises:
-        ConfigError: a number is negative, or there is nothing to see.
-    """
+    """Measure and print. Raises ConfigError: a number is negative, or there is nothing to see."""
     if min(config.observations, config.seed) < 0 or config.objects < NEAR:
         raise ConfigError(f"--observations and --seed are at least 0, --objects at least {NEAR}.")
     with TemporaryDirectory() as folder:

@@ -110,11 +110,7 @@ def _print(found: dict[Side, ReachMap]) -> None:
 
 
 def picture(found: dict[Side, ReachMap]) -> NDArray[np.uint8]:
-    """Return (height, width, 3) RGB: slices at several heights, both hands in one plane.
-
-    Raises:
-        MissingExtra: matplotlib is not installed.
-    """
+    """Return (height, width, 3) RGB, slices at several heights, of both hands. Raises MissingExtra: no matplotlib."""
     grid = found["right"]
     heights = [-0.12, -0.04, 0.04, 0.20, 0.40]
     figure = blank_figure(1300, 240, facecolor="white")

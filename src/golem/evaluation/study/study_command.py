@@ -245,20 +245,11 @@ def _state(config: StudyConfig, study: StudyFile, cells: Sequence[Cell], out: Pa
             "another --out."
         )
     facts = {
-        "name": config.paths[0].stem,
-        "title": study.title,
-        "about": study.about,
-        "by_construction": study.by_construction,
-        "command": config.command(),
-        "commit": commit(),
-        "code": code,
-        "stop": study.stop,
-        "margin": study.margin,
-        "score": study.score,
-        "comparisons": comparisons,
-        "compare": [list(pair) for pair in study.compare],
-        "cells": {cell.name: cell.config.n for cell in cells},
-    }
+        "name": config.paths[0].stem, "title": study.title, "about": study.about,
+        "by_construction": study.by_construction, "command": config.command(), "commit": commit(), "code": code,
+        "stop": study.stop, "margin": study.margin, "score": study.score, "comparisons": comparisons,
+        "compare": [list(pair) for pair in study.compare], "cells": {cell.name: cell.config.n for cell in cells},
+    }  # fmt: skip
     write_file(out / FACTS, json.dumps(facts, indent=1) + "\n")
 
 

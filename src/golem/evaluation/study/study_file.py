@@ -74,13 +74,7 @@ class StudyFile:
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """One ladder of a study.
-
-    Attributes:
-        name: of the cell and its folder.
-        config: the ladder, whole but for folder and processes.
-        best_n: see `StudyEntry`.
-    """
+    """One ladder of a study, named as its folder; `config` is whole but for folder and processes."""
 
     name: str
     config: LadderConfig
@@ -88,15 +82,12 @@ class Cell:
 
 
 def read_study_file(path: Path) -> tuple[StudyFile, tuple[Cell, ...]]:
-    """Return a study file and its cells, each with a name of its own.
-
-    Raises:
-        ConfigError: it cannot be read, or says what cannot be; names the file.
-    """
+    """Return a study file and its named cells. Raises ConfigError: it cannot be read or cannot be; names the file."""
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, ValueError) as error:
-        raise ConfigError(f"Cannot read the study {path}: {error}; see the folder studies for examples.") from error
+        why = getattr(error, "strerror", None) or error
+        raise ConfigError(f"Cannot read the study {path}: {why}; see the folder studies for examples.") from error
     data = read_yaml(text, str(path))
     if not isinstance(data, Mapping):
         raise ConfigError(

@@ -21,6 +21,8 @@ from golem.evaluation.metrics.text_table import TextTable, short_names
 
 FACTS = "study.json"
 EMPTY = "-"
+WORDS = ("name", "title", "about", "by_construction", "command", "stop")
+"""What the facts of a study say in words."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,21 +201,15 @@ def read_study(folder: Path) -> Study:
         results = tuple(
             CellResult(name, path, facts["cells"][name], tuple(finished_records(path))) for name, path in held.items()
         )
-        study = Study(
-            facts["name"], facts["title"], facts["about"], facts["by_construction"], facts["command"], facts["stop"],
-            StopRule(facts["margin"], facts["comparisons"], facts["score"]),
-            tuple((a, b) for a, b in facts["compare"]), results, tuple(name for name in cells if name not in held),
-        )  # fmt: skip
+        missing = tuple(name for name in cells if name not in held)
+        words = {name: facts[name] for name in WORDS}
+        study = Study(**words, rule=facts["rule"], compare=facts["compare"], cells=results, missing=missing)
     refuse_mixed([study])
     return study
 
 
 def refuse_mixed(studies: Sequence[Study]) -> None:
-    """Refuse what was measured with several states of the code: it is no comparison.
-
-    Raises:
-        ConfigError: it was.
-    """
+    """Refuse what was measured with several states of the code: it is no comparison. Raises ConfigError: it was."""
     codes: dict[str, tuple[str, str]] = {}
     for cell, r in itertools.chain(*([(c, r) for c in s.cells for r in c.records] for s in studies)):
         codes.setdefault(r.code, (r.commit, str(cell.folder)))
@@ -224,8 +220,12 @@ def refuse_mixed(studies: Sequence[Study]) -> None:
 
 def _facts(folder: Path) -> dict[str, Any] | None:
     try:
-        return json.loads((folder / FACTS).read_text(encoding="utf-8"))
+        facts = json.loads((folder / FACTS).read_text(encoding="utf-8"))
+        words = {name: str(facts[name]) for name in WORDS}
+        rule = StopRule(facts["margin"], facts["comparisons"], facts["score"])
+        pairs = tuple((str(a), str(b)) for a, b in facts["compare"])
+        return {**words, "rule": rule, "compare": pairs, "cells": {str(k): int(n) for k, n in facts["cells"].items()}}
     except FileNotFoundError:
         return None
-    except (OSError, ValueError) as error:
-        raise ConfigError(f"{folder / FACTS} is no study: {error}; run the study again.") from error
+    except (OSError, ValueError, TypeError, KeyError, AttributeError, ConfigError) as error:
+        raise ConfigError(f"{folder / FACTS} is no study: {error!r}; run the study again.") from error

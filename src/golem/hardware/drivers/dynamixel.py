@@ -34,13 +34,7 @@ ERRORS = {
 
 @dataclass(frozen=True, slots=True)
 class StatusPacket:
-    """What a servo answers.
-
-    Attributes:
-        id: of the servo, 0 to 253.
-        error: bits of `ERRORS`.
-        parameters: what was read.
-    """
+    """What a servo answers: its `id` is 0 to 253, `error` has bits of `ERRORS`."""
 
     id: int
     error: int

@@ -96,11 +96,7 @@ class Ax12State:
 
 
 def decode(data: bytes) -> Ax12State:
-    """Return what the `STATE_SIZE` bytes from present position on say; more bytes may follow.
-
-    Raises:
-        ValueError: they say something that no AX-12A reports.
-    """
+    """Return what `STATE_SIZE` bytes from present position on say. Raises ValueError: what no AX-12A reports."""
     if len(data) < STATE_SIZE:
         raise ValueError(f"{len(data)} bytes instead of {STATE_SIZE}")
     position, speed, load = (int.from_bytes(data[i : i + 2], "little") for i in (0, 2, 4))
@@ -282,11 +278,7 @@ class MagpieServos:
         return self._parser.skipped
 
     def command(self, command: HandCommand) -> None:
-        """Take what the hand is told from now on; gap and force are limited to what it can do.
-
-        Raises:
-            ValueError: a number is not finite.
-        """
+        """Take what the hand is told, as far as it can do it. Raises ValueError: a number is not finite."""
         if not (math.isfinite(command.gap) and math.isfinite(command.force)):
             raise ValueError(f"A hand is told finite numbers, not {command}.")
         force = min(max(command.force, magpie_model.MIN_FORCE), magpie_model.MAX_FORCE)

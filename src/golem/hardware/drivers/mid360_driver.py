@@ -64,13 +64,7 @@ class PointDatagram:
 
 @dataclass(frozen=True, slots=True)
 class ImuDatagram:
-    """One sample of the IMU inside.
-
-    Attributes:
-        t: device time [ns].
-        gyro: (3,) [rad/s].
-        acc: (3,) specific force [m/s^2].
-    """
+    """One sample of the IMU inside: device time `t` [ns], `gyro` (3,) [rad/s], specific force `acc` (3,) [m/s^2]."""
 
     t: int
     gyro: Array
@@ -78,11 +72,7 @@ class ImuDatagram:
 
 
 def decode_datagram(data: bytes) -> PointDatagram | ImuDatagram:
-    """Return what a datagram says.
-
-    Raises:
-        ValueError: it is none of these two, or damaged.
-    """
+    """Return what a datagram says. Raises ValueError: it is none of these two, or damaged."""
     if len(data) < HEADER.size:
         raise ValueError(f"{len(data)} bytes are no datagram of a MID-360")
     version, length, interval, dots, _, _, kind, _, checksum, t = HEADER.unpack_from(data)
@@ -126,11 +116,7 @@ class LidarError(GolemError):
 
 
 class ScanAssembler:
-    """Puts the points of datagrams together to scans of 0.1 s.
-
-    Attributes:
-        lost: firings that are missing between datagrams.
-    """
+    """Puts the points of datagrams together to scans of 0.1 s; `lost` counts the firings that are missing."""
 
     def __init__(self) -> None:
         self.lost = 0

@@ -38,12 +38,7 @@ class CameraError(GolemError):
 
 
 def library() -> Any:
-    """Return pyrealsense2.
-
-    Raises:
-        MissingExtra: it is absent.
-        MissingSystemLibrary: its USB library is.
-    """
+    """Return pyrealsense2. Raises MissingExtra: it is absent; MissingSystemLibrary: its USB library is."""
     try:
         import pyrealsense2
     except ModuleNotFoundError as error:

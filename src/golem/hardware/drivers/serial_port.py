@@ -8,7 +8,7 @@ import select
 import termios
 from contextlib import suppress
 
-from golem.errors import GolemError, MissingExtra
+from golem.errors import GolemError, needs
 
 CHUNK = 4096
 """Most bytes taken at once: what the operating system keeps for a port."""
@@ -19,11 +19,7 @@ class PortError(GolemError):
 
 
 class SerialPort:
-    """An open serial port, for this process alone.
-
-    Attributes:
-        name: its path, e.g. /dev/ttyACM0.
-    """
+    """An open serial port, for this process alone; `name` is its path, e.g. /dev/ttyACM0."""
 
     def __init__(self, name: str, baud: int) -> None:
         """Open the port called `name` at `baud` [1/s], 8 data bits, no parity, 1 stop bit; drop what it had received.
@@ -32,10 +28,8 @@ class SerialPort:
             MissingExtra: pyserial is absent.
             PortError: it cannot be opened, or another process has it.
         """
-        try:
+        with needs("pyserial", "hardware"):
             import serial
-        except ModuleNotFoundError as error:
-            raise MissingExtra("pyserial", "hardware") from error
         self.name = name
         try:
             self._port = serial.Serial(name, baud, timeout=0, write_timeout=0, exclusive=True)
@@ -43,11 +37,7 @@ class SerialPort:
             raise PortError(f"The serial port '{name}' cannot be opened: {_reason(error)}.") from error
 
     def read(self) -> bytes:
-        """Return what has come, b"" if nothing has.
-
-        Raises:
-            PortError: the port is gone.
-        """
+        """Return what has come, b"" if nothing has. Raises PortError: the port is gone."""
         # Not by pyserial: to write without waiting, it asks a full buffer again and again for ever.
         try:
             file = self._port.fileno()
@@ -63,11 +53,7 @@ class SerialPort:
         return data
 
     def write(self, data: bytes) -> None:
-        """Send `data`; what finds no room is lost.
-
-        Raises:
-            PortError: the port is gone.
-        """
+        """Send `data`; what finds no room is lost. Raises PortError: the port is gone."""
         try:
             os.write(self._port.fileno(), data)
         except BlockingIOError:

@@ -37,11 +37,7 @@ def base_rotation(quat: Array, torso: float, heading: float, out: Array) -> None
 
 
 class Attitude:
-    """The orientation of base_link in odom, whose heading is zero at the reset.
-
-    Attributes:
-        heading: of odom in the IMU's world [rad].
-    """
+    """The orientation of base_link in odom, which has the `heading` in the IMU's world [rad] of the reset."""
 
     def __init__(self) -> None:
         self.heading = 0.0

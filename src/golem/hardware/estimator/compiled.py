@@ -21,7 +21,6 @@ class CompiledEstimator:
         return self.stage if own(self, CompiledEstimator, "step") else None
 
     def step(self, state: LowState, dt: float) -> BaseEstimate:
-        """Fuse one measurement; see `BaseEstimator`."""
         check_measured(state)
         put_state(self._record, state)
         self._record["dt"] = dt

@@ -22,8 +22,7 @@ from golem.hardware.estimator import feet_kernel
 from golem.hardware.estimator.feet_kernel import contact, loads, press, wrenches
 from golem.kernels import njit
 from golem.native import Record, Records
-from golem.robots.model.leg_dynamics import leg_tree
-from golem.robots.model.leg_kernel import LEG, LEG_MOTION, leg_motion, tree_dtype
+from golem.robots.model.leg_kernel import LEG, LEG_MOTION, leg_motion, leg_tree, tree_dtype
 from golem.robots.model.table import SOLE
 from golem.types import GRAVITY, LEGS, Array
 

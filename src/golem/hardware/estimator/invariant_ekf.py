@@ -147,7 +147,7 @@ class InvariantFilter:
         predict(self.memory[0], gyro, acc, weight, dt)
 
     def update(self, points: Array, weight: Array, shift: Array, heading: float, hanging: bool) -> NDArray[np.bool_]:
-        """Fuse where the feet are seen, and the heading.
+        """Fuse where the feet are seen, and the heading; return (2,) which feet were believed.
 
         Args:
             points: (2, 3) contact points, in the IMU's frame [m].
@@ -156,9 +156,6 @@ class InvariantFilter:
                 IMU [m].
             heading: by how much the estimated heading exceeds the IMU's own [rad].
             hanging: whether to take the robot as being at rest.
-
-        Returns:
-            (2,) which feet were believed.
         """
         return update(self.memory[0], points, weight, shift, heading, hanging)
 

@@ -79,16 +79,13 @@ def filter_options(config: RandomWalkConfig) -> Array:
 
 @njit(cache=True, nogil=True)
 def fuse(m: Record, measured: Array, weight: Array, dt: float) -> Array:
-    """Predict by `dt` [s] and fuse what the feet measure.
+    """Predict by `dt` [s] and fuse what the feet measure; return what each contributed, (2,) [s^2/m^2], 0 for none.
 
     Args:
         m: the memory of one robot, a `FILTER`.
         measured: (2, 3) the velocity that each foot implies, see `base_velocity` [m/s].
         weight: (2,) how far each foot is to be believed, 0 to 1, from `feet.contact`.
         dt: time since the previous estimate [s].
-
-    Returns:
-        (2,) what each foot contributed [s^2/m^2], 0 for one that was left out.
     """
     walk, foot_noise, min_weight = m.options[0], m.options[1], m.options[2]
     gate, reject = m.options[3], m.options[4]
@@ -119,11 +116,7 @@ def _fuse_all(memories: Records, measured: Array, weight: Array, dt: float) -> N
 
 
 class RandomWalk:
-    """`fuse` for `shape` robots.
-
-    Attributes:
-        config: noise and gates.
-    """
+    """`fuse` for `shape` robots."""
 
     def __init__(self, config: RandomWalkConfig, shape: tuple[int, ...] = ()) -> None:
         self.config = config

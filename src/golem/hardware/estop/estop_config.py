@@ -81,10 +81,5 @@ class EstopConfig:
         ]
 
     def create(self) -> EmergencyStop:
-        """Build the emergency stop.
-
-        Raises:
-            MissingExtra: pyserial is absent.
-            PortError: the port cannot be opened.
-        """
+        """Build the emergency stop. Raises MissingExtra: pyserial is absent; PortError: the port cannot be opened."""
         return SerialEstop(self.port, self.oldest) if self.use == "serial" else VirtualEstop()

@@ -48,11 +48,7 @@ def checksum(data: bytes) -> int:
 
 
 class FrameParser:
-    """Finds frames among bytes, and finds the next one after bytes that are none.
-
-    Attributes:
-        skipped: bytes that belonged to no sound frame.
-    """
+    """Finds frames among bytes, also after those that are none; `skipped` belonged to no sound frame."""
 
     def __init__(self) -> None:
         self.skipped = 0

@@ -53,7 +53,6 @@ class DeliGrasp(MagpieHand):
         self._due, self._finished = math.inf, False
 
     def step(self, state: HandState, t: float) -> HandCommand:
-        """Take in what the hand reports and return what it is told at `t` [s]; see `MagpieHand.step`."""
         command = super().step(state, t)
         if self._last is None:
             return command

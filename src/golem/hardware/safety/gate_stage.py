@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from golem.hardware.safety.base import Counters, Outgoing, SafetyLimits
-from golem.hardware.safety.gate_balance import BALANCE, balances, carried, sense_balance, unbalanced
+from golem.hardware.safety.gate_balance import AIRBORNE, BALANCE, balances, carried, sense_balance, unbalanced
 from golem.hardware.safety.kernel import ORDINARY as SOUND
 from golem.hardware.safety.kernel import UNKNOWN, limited, ordinary_command, rate_state
 from golem.hardware.safety.limit_table import LEAST_KP
@@ -159,7 +159,8 @@ def pass_command(r: Record, m: Record) -> bool:
         moves = min(moves + 1, LIVELY) if r.request_t - moved <= 0.5 * m.hung else 0
         moved = r.request_t
     elif m.frozen > 0.0 and moves == LIVELY and r.request_t - moved > m.hung:
-        return False
+        if looks or m.balance.airborne <= AIRBORNE:  # only of feet that carry, which a look may find
+            return False
 
     # From here on the tick is ordinary, and is remembered.
     if looks:
@@ -329,37 +330,17 @@ class GateStage:
         grounded, t = float(row["grounded"]), float(row["t"])
         balance = self.stage.memory["balance"].copy()
         senses = SensesMemory(
-            tick=float(row["tick"]),
-            q=row["q"].copy(),
-            dq=row["dq"].copy(),
-            bad=float(row["bad"]),
-            looked=state_of(row["looked"], float(row["looked_t"])),
-            looked_at=float(row["looked_at"]),
-            since=tuple(row["since"].tolist()),
-            drift=row["drift_now"].copy(),
-            turn=tuple(row["turn"].tolist()),
-            force=tuple(row["force"].tolist()),
-            restless=float(row["restless"]),
-            asked=row["asked"].copy(),
-            dead=row["dead"].copy(),
-            balance=balance,
-            carries=carried(balance),
-            unsteady=unbalanced(balance),
-        )
+            tick=float(row["tick"]), q=row["q"].copy(), dq=row["dq"].copy(), bad=float(row["bad"]),
+            looked=state_of(row["looked"], float(row["looked_t"])), looked_at=float(row["looked_at"]),
+            since=tuple(row["since"].tolist()), drift=row["drift_now"].copy(), turn=tuple(row["turn"].tolist()),
+            force=tuple(row["force"].tolist()), restless=float(row["restless"]), asked=row["asked"].copy(),
+            dead=row["dead"].copy(), balance=balance, carries=carried(balance), unsteady=unbalanced(balance),
+        )  # fmt: skip
         return GateMemory(
-            t=t,
-            mode=gate.mode,
-            since=gate.since,
-            state=state_of(row["state"], float(row["state_t"])),
-            command=command,
-            estop=EstopMessage(float(row["estop_t"]), int(row["estop_sequence"]), False),
-            counters=Counters(strained=bool(row["strained"])),
-            outgoing=Outgoing(*row["outgoing"].copy()),
-            request=gate.request,
-            grounded=None if grounded == -math.inf else grounded,
-            senses=senses,
+            t=t, mode=gate.mode, since=gate.since, state=state_of(row["state"], float(row["state_t"])),
+            command=command, estop=EstopMessage(float(row["estop_t"]), int(row["estop_sequence"]), False),
+            counters=Counters(strained=bool(row["strained"])), outgoing=Outgoing(*row["outgoing"].copy()),
+            request=gate.request, grounded=None if grounded == -math.inf else grounded, senses=senses,
             sender=SenderMemory(command, True, 0, float(row["jolts"]), True, float(row["moved"]), int(row["moves"])),
-            prompt=float(row["prompt"]),
-            sent=command_of(row["sent"], t),
-            stopped=gate.stopped,
-        )
+            prompt=float(row["prompt"]), sent=command_of(row["sent"], t), stopped=gate.stopped,
+        )  # fmt: skip

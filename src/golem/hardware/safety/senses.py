@@ -124,23 +124,9 @@ def sense(
 def _kept(m: SensesMemory, tick: float, state: LowState, bad: float, drift: Array) -> SensesMemory:
     """Return `m` with a newer sample; `replace` would take ten times the time."""
     return SensesMemory(
-        tick,
-        state.q,
-        state.dq,
-        bad,
-        m.looked,
-        m.looked_at,
-        m.since,
-        drift,
-        m.turn,
-        m.force,
-        m.restless,
-        m.asked,
-        m.dead,
-        m.balance,
-        m.carries,
-        m.unsteady,
-    )
+        tick, state.q, state.dq, bad, m.looked, m.looked_at, m.since, drift, m.turn, m.force, m.restless, m.asked,
+        m.dead, m.balance, m.carries, m.unsteady,
+    )  # fmt: skip
 
 
 def _jumped(
@@ -193,23 +179,12 @@ def _look(
     tx, ty, tz, fx, fy, fz, rate, drifts, dead, *same = out[SCALARS:].tolist()
     balance = sensed(m.balance, state, dt, limits)
     after = SensesMemory(
-        m.tick,
-        m.q,
-        m.dq,
-        m.bad,
-        state,
-        tick,
-        tuple([since if repeats else tick for since, repeats in zip(m.since, same, strict=True)]),
-        out[:NUM_JOINTS],
-        (tx, ty, tz),
-        (fx, fy, fz),
-        tick if rate > CALM else m.restless,
-        None if sent is None else out[2 * NUM_JOINTS : SCALARS],
-        out[NUM_JOINTS : 2 * NUM_JOINTS],
-        balance,
-        carried(balance),
-        unbalanced(balance),
-    )
+        m.tick, m.q, m.dq, m.bad, state, tick,
+        tuple([since if repeats else tick for since, repeats in zip(m.since, same, strict=True)]), out[:NUM_JOINTS],
+        (tx, ty, tz), (fx, fy, fz), tick if rate > CALM else m.restless,
+        None if sent is None else out[2 * NUM_JOINTS : SCALARS], out[NUM_JOINTS : 2 * NUM_JOINTS], balance,
+        carried(balance), unbalanced(balance),
+    )  # fmt: skip
     return after, (
         _frozen(after, limits)
         or (_drifts(after, state.dq + before.dq, limits) if drifts > limits.drift else None)

@@ -49,16 +49,10 @@ class Gravity:
     """
 
     def __init__(self, hands: bool = True) -> None:
-        """Build the model, with or without the MAGPIE hands."""
         self._tree = body_tree(hands)[0]
 
     def torque(self, q: Array, quat: Array) -> Array:
-        """Return the (27,) torque [N m] that balances gravity.
-
-        Args:
-            q: (27,) joint positions [rad].
-            quat: (4,) orientation of the torso IMU, wxyz.
-        """
+        """Return the (27,) torque [N m] against gravity at `q` (27,) [rad], the torso's IMU being `quat` (4,) wxyz."""
         field, out = np.empty(3), np.empty(NUM_JOINTS)
         gravity_in_base(quat, float(q[TORSO]), field)
         tree_gravity(self._tree, q, field, out)

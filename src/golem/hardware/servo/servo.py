@@ -144,11 +144,7 @@ class Servo:
     """
 
     def __init__(self, config: ServoConfig | None = None) -> None:
-        """Build the gravity model and look the limits up.
-
-        Raises:
-            ConfigError: the limit profile does not exist.
-        """
+        """Build the gravity model and look the limits up. Raises ConfigError: the limit profile does not exist."""
         self.config = c = config or ServoConfig()
         self.stage = CompiledStage(_code(), new_record(SERVO))
         memory, gains = self.stage.memory, default_gains()

@@ -43,7 +43,6 @@ class BagMessage:
     """One recorded message.
 
     Attributes:
-        topic: where it was published.
         log_time: when it was recorded [ns]: since 1970, or since the start of an episode in lock-step.
         publish_time: when it was published [ns], by the publisher's clock.
         payload: CDR with its encapsulation header.
@@ -59,11 +58,7 @@ class Sink(Protocol):
     """Takes messages: a bag, or viewers."""
 
     def write(self, message: BagMessage) -> None:
-        """Take one message.
-
-        Raises:
-            OutputError: it cannot be written.
-        """
+        """Take one message. Raises OutputError: it cannot be written."""
         ...
 
     def close(self) -> None:

@@ -10,16 +10,14 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from golem.errors import ConfigError, MissingExtra
+from golem.errors import ConfigError, needs
 from golem.middleware.bags.base import BagMessage, BagTopic
 from golem.middleware.bags.recorder import Recorder
 from golem.middleware.web_gate import OriginGate, TokenGate, hidden_loopback, is_loopback
 
-try:
+with needs("foxglove-sdk", "foxglove"):
     import foxglove
     from foxglove.websocket import Capability
-except ModuleNotFoundError as error:
-    raise MissingExtra("foxglove-sdk", "foxglove") from error
 
 
 VIEWERS = ("https://app.foxglove.dev", "file://")
@@ -47,11 +45,7 @@ class FoxgloveServer:
     """Sends every message to the viewers that subscribe to its topic; see `Sink`."""
 
     def __init__(self, config: ServerConfig | None = None) -> None:
-        """Listen.
-
-        Raises:
-            ConfigError: the address cannot be listened on.
-        """
+        """Listen. Raises ConfigError: the address cannot be listened on."""
         config = config or ServerConfig()
         self._context = foxglove.Context()
         self._channels: dict[str, foxglove.Channel] = {}

@@ -30,12 +30,7 @@ AUTOMATIC = 1
 
 @dataclass
 class Contents:
-    """What is in one file of a bag.
-
-    Attributes:
-        first, last: smallest and greatest log time [ns]; meaningless while there is no message.
-        counts: messages per topic.
-    """
+    """What is in one file of a bag: log times [ns], meaningless without a message, and messages per topic."""
 
     first: int = 0
     last: int = 0
@@ -98,12 +93,7 @@ def dump(value: object) -> str:
 
 
 def information(files: Mapping[str, Contents], custom: Mapping[str, str]) -> dict[str, Any]:
-    """Return what rosbag2 calls BagMetadata.
-
-    Args:
-        files: contents by name of the file, in order.
-        custom: what else the bag says about itself.
-    """
+    """Return rosbag2's BagMetadata of the contents of `files`, in order, and what else is said, `custom`."""
     whole = Contents()
     for contents in files.values():
         whole.merge(contents)

@@ -54,12 +54,7 @@ class Player:
     """Writes the messages of a bag."""
 
     def __init__(self, bag: Bag, participant: Participant, config: PlayConfig | None = None) -> None:
-        """Announce the topics of `bag` on the domain of `participant`.
-
-        Raises:
-            ConfigError: a chosen topic is not in the bag.
-            DdsError: a topic cannot be written.
-        """
+        """Announce the topics of `bag` on a domain. Raises ConfigError: a chosen one is absent; DdsError: no writer."""
         self._bag, self._participant, self._config = bag, participant, config or PlayConfig()
         for name in self._config.topics:
             if name in bag.foreign:

@@ -53,11 +53,7 @@ class Bag:
     """
 
     def __init__(self, path: Path) -> None:
-        """Look through the bag at `path`, a folder or an MCAP file.
-
-        Raises:
-            BagError: there is none, or it is damaged.
-        """
+        """Look through the bag at `path`, a folder or an MCAP file. Raises BagError: it is absent or damaged."""
         self.path = path
         self.files = [BagFile(file) for file in _files(path)]
         self.topics = {topic.name: topic for file in self.files for topic in file.topics}
@@ -85,13 +81,7 @@ class Bag:
 
 
 class BagFile:
-    """One MCAP file of a bag.
-
-    Attributes:
-        finished: whether its writer completed it.
-        foreign: see `Bag`.
-        custom: what its writer said about the bag.
-    """
+    """One MCAP file of a bag; `finished` if its writer completed it; see `Bag`."""
 
     def __init__(self, path: Path) -> None:
         """Look through it; errors as for `Bag`."""
@@ -112,7 +102,6 @@ class BagFile:
         return list(self._channels.values())
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[BagMessage]:
-        """Iterate over its messages; see `Bag`."""
         with self._open() as file:
             if not self._indexed:
                 yield from (m for m in self._scan(file) if topics is None or m.topic.name in topics)
@@ -176,12 +165,9 @@ class BagFile:
 
 
 def repair(folder: Path) -> list[Path]:
-    """Finish every file of the bag in `folder` that its writer did not, and write the table of contents.
+    """Finish the files of the bag in `folder` that its writer did not, write its table of contents; return the files.
 
     Such a file is replaced by a copy of its whole chunks, which needs as much space on the disk.
-
-    Returns:
-        The files that were finished.
 
     Raises:
         BagError: there is no such folder, or the bag is damaged.

@@ -77,11 +77,7 @@ class Recorder:
         self.overruns: dict[str, int] = {}
 
     def add(self, topics: Iterable[BagTopic]) -> None:
-        """Record `topics` from now on; one that is recorded already stays as it is.
-
-        Raises:
-            DdsError: a topic cannot be read.
-        """
+        """Record `topics` from now on, what is recorded already as it is. Raises DdsError: one cannot be read."""
         for topic in topics:
             if topic.name in self._subscriptions:
                 continue

@@ -58,11 +58,7 @@ class BagWriter:
     """Writes one bag; see `Sink`."""
 
     def __init__(self, folder: Path, config: BagConfig | None = None, custom: Mapping[str, str] | None = None) -> None:
-        """Create `folder`, with what `custom` says about the bag in its metadata.
-
-        Raises:
-            OutputError: it exists already, or cannot be created.
-        """
+        """Create `folder`, with `custom` in the bag's metadata. Raises OutputError: it exists, or cannot be created."""
         self.folder = folder
         self._config = config or BagConfig()
         self._custom = dict(custom or {})
@@ -92,7 +88,6 @@ class BagWriter:
         return f"{self.messages} messages, {self.size / 1e6:.1f} MB, in {self.folder}"
 
     def write(self, message: BagMessage) -> None:
-        """Add one message; see `Sink`."""
         if self._closed:
             raise OutputError(f"The bag {self.folder} is closed.")
         try:
@@ -209,12 +204,7 @@ class McapFile:
 
 
 def write_metadata(folder: Path, files: Mapping[str, Contents], custom: Mapping[str, str]) -> None:
-    """Write the table of contents of a bag whole or not at all.
-
-    Raises:
-        OSError: it cannot be written.
-    """
+    """Write the table of contents of a bag whole or not at all. Raises OSError: it cannot be written."""
     part = folder / f"{METADATA}.part"
-    about = {"rosbag2_bagfile_information": information(files, custom)}
-    part.write_text(dump(about), encoding="utf-8")
+    part.write_text(dump({"rosbag2_bagfile_information": information(files, custom)}), encoding="utf-8")
     os.replace(part, folder / METADATA)

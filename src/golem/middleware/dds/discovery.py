@@ -38,8 +38,6 @@ class Endpoint:
     """A writer or reader of somebody's.
 
     Attributes:
-        topic: name of its topic.
-        type_name: name of its type.
         qos: what it offers or requests.
         guid: 16 bytes.
         participant: guid of its participant.

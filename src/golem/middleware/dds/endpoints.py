@@ -42,8 +42,6 @@ class _Endpoint:
     """What writers and readers have in common.
 
     Attributes:
-        topic: name of the topic.
-        type_name: name of its type.
         qos: what it offers or requests.
         guid: 16 bytes, unique on the domain.
         handle: instance handle (uint64) by which its participant knows it.
@@ -91,16 +89,11 @@ class _Endpoint:
 
 
 class CycloneWriter(_Endpoint):
-    """A writer of a `CycloneParticipant`; see `base.Writer`.
-
-    Attributes:
-        dropped: samples that were not sent because a reliable reader was too far behind.
-    """
+    """A writer of a `CycloneParticipant`; `dropped` samples were too many for a reliable reader; see `base.Writer`."""
 
     kind = "writer"
 
     def __init__(self, owner: Owner, topic: str, type_name: str, qos: Qos, entity: int) -> None:
-        """Take over `entity`, a writer."""
         super().__init__(owner, topic, type_name, qos, entity)
         self.dropped = 0
         sertype = ctypes.c_void_p()
@@ -145,18 +138,13 @@ class CycloneWriter(_Endpoint):
 
 
 class CycloneReader(_Endpoint):
-    """A reader of a `CycloneParticipant`; see `base.Reader`.
-
-    Attributes:
-        on_data: called by the participant's waitset thread.
-    """
+    """A reader of a `CycloneParticipant`, whose waitset thread calls `on_data`; see `base.Reader`."""
 
     kind = "reader"
 
     def __init__(
         self, owner: Owner, topic: str, type_name: str, qos: Qos, entity: int, on_data: Callable[[], None] | None
     ) -> None:
-        """Take over `entity`, a reader."""
         super().__init__(owner, topic, type_name, qos, entity)
         self.on_data = on_data
         self._serdata = (ctypes.c_void_p * _BATCH)()

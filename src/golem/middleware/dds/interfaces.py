@@ -20,13 +20,7 @@ _GET_ADDRESS = 0x8915
 
 @dataclass(frozen=True, slots=True)
 class Interface:
-    """A network interface.
-
-    Attributes:
-        name: as the operating system calls it.
-        loopback: whether it stays on this machine.
-        multicast: whether it can send to groups.
-    """
+    """A network interface, `loopback` if it stays on this machine, `multicast` if it can send to groups."""
 
     name: str
     loopback: bool

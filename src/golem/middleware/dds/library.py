@@ -165,11 +165,7 @@ class Cyclone:
     """
 
     def __init__(self, path: Path) -> None:
-        """Load the library at `path` and declare its functions.
-
-        Raises:
-            DdsError: it lacks one of them.
-        """
+        """Load the library at `path` and declare its functions. Raises DdsError: it lacks one of them."""
         self.blocking: Any = ctypes.CDLL(str(path))
         self.quick: Any = ctypes.PyDLL(str(path))
         for name, (result, arguments) in _SIGNATURES.items():
@@ -181,11 +177,7 @@ class Cyclone:
                 function.restype, function.argtypes = result, arguments
 
     def check(self, code: int, what: str) -> int:
-        """Return `code` unless it is an error.
-
-        Raises:
-            DdsError: it is; `what` says what could not be done, and what the user can change.
-        """
+        """Return `code` unless it is an error. Raises DdsError: `what` could not be done, and what may be changed."""
         if code < 0:
             reason = self.quick.dds_strretcode(code).decode()
             raise DdsError(f"{what} (Cyclone DDS says: {reason}).")
@@ -194,12 +186,7 @@ class Cyclone:
 
 @functools.cache
 def cyclone() -> Cyclone:
-    """Return the library, loaded once per process.
-
-    Raises:
-        MissingExtra: cyclonedds is not installed.
-        DdsError: another series of it is.
-    """
+    """Return the library, loaded once. Raises MissingExtra: it is not installed; DdsError: another series is."""
     found = util.find_spec("cyclonedds")
     if found is None or found.origin is None:
         raise MissingExtra("cyclonedds", "dds")

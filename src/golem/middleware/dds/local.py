@@ -20,11 +20,7 @@ class LocalDomain:
     """What the participants of one process share; the counterpart of a DDS domain."""
 
     def __init__(self, clock: Callable[[], float] = time.time) -> None:
-        """Start empty.
-
-        Args:
-            clock: gives the source time of samples [s since 1970].
-        """
+        """Start empty; `clock` gives the source time of samples [s since 1970]."""
         self.clock = clock
         self.lock = threading.RLock()
         self._numbers = itertools.count(1)
@@ -120,12 +116,7 @@ def _guid(participant: int, entity: int) -> bytes:
 
 
 class LocalParticipant:
-    """A member of a `LocalDomain`.
-
-    Attributes:
-        guid: 16 bytes, unique on the domain.
-        network: None.
-    """
+    """A member of a `LocalDomain`, on no network; its `guid` is 16 bytes, unique on the domain."""
 
     network: NetworkPlace | None = None
 

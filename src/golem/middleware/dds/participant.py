@@ -104,11 +104,7 @@ _PROGRAM = (0x01 << 24 | 0x01 << 16, 0, 0x00 << 24)
 
 
 def create_topic(library: Cyclone, participant: int, name: str, type_name: str) -> int:
-    """Create a topic of opaque samples and return its entity.
-
-    Raises:
-        DdsError: Cyclone refuses, e.g. because the name has a character that topics cannot have.
-    """
+    """Create a topic of opaque samples; return its entity. Raises DdsError: Cyclone refuses, e.g. its name."""
     program = (ctypes.c_uint32 * len(_PROGRAM))(*_PROGRAM)
     descriptor = TopicDescriptor(
         size=1,
@@ -150,7 +146,6 @@ class Dispatcher:
     """
 
     def __init__(self, library: Cyclone, participant: int) -> None:
-        """Start the thread for `participant`, an entity."""
         self._library = library
         self._readers: dict[int, Watched] = {}
         calls = library.blocking

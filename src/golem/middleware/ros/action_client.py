@@ -53,11 +53,7 @@ class ClientGoal:
 
 
 class ActionClient:
-    """Gives goals to one action.
-
-    Attributes:
-        malformed: feedback and status messages that could not be read.
-    """
+    """Gives goals to one action; `malformed` counts feedback and statuses that could not be read."""
 
     def __init__(self, endpoints: NodeEndpoints, name: str, type: str) -> None:
         self.name, self.malformed = name, 0

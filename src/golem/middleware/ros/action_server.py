@@ -14,22 +14,8 @@ from typing import Any, Protocol
 
 from golem.middleware.dds.base import DEFAULT, LATCHED
 from golem.middleware.ros import codec, names
+from golem.middleware.ros import goals as states
 from golem.middleware.ros.future import RosError
-from golem.middleware.ros.goals import (
-    CANCEL_GOAL,
-    NO_ID,
-    STATUS_ARRAY,
-    CancelCode,
-    GoalEvent,
-    GoalState,
-    GoalStatus,
-    GoalTable,
-    from_time,
-    from_uuid,
-    goal_info,
-    to_time,
-    to_uuid,
-)
 from golem.middleware.ros.message import NANO
 from golem.middleware.ros.msgs.action_msgs import CancelGoal_Request, CancelGoal_Response, GoalStatusArray
 from golem.middleware.ros.msgs.action_msgs import GoalStatus as StatusMessage
@@ -58,7 +44,7 @@ class ServerGoal:
         client: 12 bytes, the same for all that one process of the sender's asks for; empty where nobody knows.
     """
 
-    def __init__(self, server: ActionServer, state: GoalState, request: Any, client: bytes) -> None:
+    def __init__(self, server: ActionServer, state: states.GoalState, request: Any, client: bytes) -> None:
         """Belong to `server`, which has accepted it from `client`."""
         self._server, self._state = server, state
         self.id, self.request, self.client = state.id, request, client
@@ -68,49 +54,29 @@ class ServerGoal:
         return self._server.serves(self.client)
 
     @property
-    def status(self) -> GoalStatus:
+    def status(self) -> states.GoalStatus:
         """Where it stands; CANCELING once a request to cancel was accepted."""
         return self._state.status
 
     def execute(self) -> None:
-        """Say that work on it begins; needed before it can succeed or be aborted, unless it is canceling.
-
-        Raises:
-            RosError: it is not waiting to be executed.
-        """
-        self._server.update(self._state, GoalEvent.EXECUTE)
+        """Say that work begins; without it no success, no abort. Raises RosError: it does not wait to be executed."""
+        self._server.update(self._state, states.GoalEvent.EXECUTE)
 
     def feedback(self, feedback: Any) -> None:
-        """Send a feedback message.
-
-        Raises:
-            RosError: the goal has ended.
-        """
+        """Send a feedback message. Raises RosError: the goal has ended."""
         self._server.send_feedback(self._state, feedback)
 
     def succeed(self, result: Any) -> None:
-        """End it: reached.
-
-        Raises:
-            RosError: it is neither executing nor canceling.
-        """
-        self._server.end(self._state, GoalEvent.SUCCEED, result)
+        """End it: reached. Raises RosError: it is neither executing nor canceling."""
+        self._server.end(self._state, states.GoalEvent.SUCCEED, result)
 
     def abort(self, result: Any) -> None:
-        """End it: failed.
-
-        Raises:
-            RosError: it is neither executing nor canceling.
-        """
-        self._server.end(self._state, GoalEvent.ABORT, result)
+        """End it: failed. Raises RosError: it is neither executing nor canceling."""
+        self._server.end(self._state, states.GoalEvent.ABORT, result)
 
     def canceled(self, result: Any) -> None:
-        """End it: given up as was asked.
-
-        Raises:
-            RosError: it is not canceling.
-        """
-        self._server.end(self._state, GoalEvent.CANCELED, result)
+        """End it: given up as was asked. Raises RosError: it is not canceling."""
+        self._server.end(self._state, states.GoalEvent.CANCELED, result)
 
 
 class ActionHandler(Protocol):
@@ -145,15 +111,15 @@ class ActionServer:
         self.name = name
         self._handler, self._now, self._endpoints = handler, now, endpoints
         self._type = codec.action(type)
-        self._table = GoalTable(result_timeout)
+        self._table = states.GoalTable(result_timeout)
         self._active: dict[bytes, ServerGoal] = {}
         self._results: dict[bytes, bytes] = {}
         self._waiting: dict[bytes, deque[Origin]] = {}
         self._news, self._next_status = False, 0.0
         parts = names.action(name)
         self._feedback = endpoints.writer(names.topic(parts.feedback), f"{type}_FeedbackMessage", DEFAULT)
-        self._status = endpoints.writer(names.topic(parts.status), STATUS_ARRAY, LATCHED)
-        self._cancel = Responder(endpoints, parts.cancel_goal, CANCEL_GOAL, self._on_cancel)
+        self._status = endpoints.writer(names.topic(parts.status), states.STATUS_ARRAY, LATCHED)
+        self._cancel = Responder(endpoints, parts.cancel_goal, states.CANCEL_GOAL, self._on_cancel)
         self._result = Responder(endpoints, parts.get_result, f"{type}_GetResult", self._on_result)
         self._goal = Responder(endpoints, parts.send_goal, f"{type}_SendGoal", self._on_goal)
         endpoints.attend(self)
@@ -181,16 +147,12 @@ class ActionServer:
             service.close()
         self._endpoints.close(self._feedback, self._status)
 
-    def update(self, goal: GoalState, event: GoalEvent) -> None:
-        """Let `event` happen to `goal`.
-
-        Raises:
-            RosError: it cannot happen in the goal's present state.
-        """
+    def update(self, goal: states.GoalState, event: states.GoalEvent) -> None:
+        """Let `event` happen to `goal`. Raises RosError: it cannot happen in the goal's present state."""
         self._table.update(goal, event, self._stamp())
         self._news = True
 
-    def end(self, goal: GoalState, event: GoalEvent, result: Any) -> None:
+    def end(self, goal: states.GoalState, event: states.GoalEvent, result: Any) -> None:
         """End `goal` by `event` and send its result to those who asked for it.
 
         Raises:
@@ -206,29 +168,24 @@ class ActionServer:
         for origin in self._waiting.pop(goal.id, ()):
             self._result.reply(origin, response)
 
-    def send_feedback(self, goal: GoalState, feedback: Any) -> None:
-        """Publish feedback on `goal`.
-
-        Raises:
-            RosError: the goal has ended.
-            CodecError: the feedback is not of the action's type.
-        """
+    def send_feedback(self, goal: states.GoalState, feedback: Any) -> None:
+        """Publish feedback on `goal`. Raises RosError: the goal has ended; CodecError: it is of another type."""
         check(f"Action '{self.name}'", feedback, self._type.Feedback)
         if not goal.status.active:
             raise RosError(f"Goal {goal.id.hex()} is {goal.status.name.lower()}: there is no feedback on it any more.")
-        self._feedback.write(codec.serialize(self._type.FeedbackMessage(to_uuid(goal.id), feedback)))
+        self._feedback.write(codec.serialize(self._type.FeedbackMessage(states.to_uuid(goal.id), feedback)))
 
     def _stamp(self) -> int:
         return int(self._now() * NANO)
 
     def _on_goal(self, origin: Origin, request: Any) -> None:
-        id, stamp = from_uuid(request.goal_id), self._stamp()
+        id, stamp = states.from_uuid(request.goal_id), self._stamp()
         # The id of no goal could not be canceled: it means all of them.
-        known = id == NO_ID or id in self._table
+        known = id == states.NO_ID or id in self._table
         accepted = not known and self._agrees(self._handler.decide, request.goal)
         state = self._table.accept(id, stamp) if accepted else None
         goal = None if state is None else ServerGoal(self, state, request.goal, self._goal.client(origin))
-        response = self._type.SendGoal.Response(accepted, to_time(stamp if accepted else 0))
+        response = self._type.SendGoal.Response(accepted, states.to_time(stamp if accepted else 0))
         self._goal.reply(origin, codec.serialize(response))
         if goal is not None:
             self._active[id] = goal
@@ -249,38 +206,38 @@ class ActionServer:
 
     def _give_up(self, goal: ServerGoal) -> None:
         """Abort a goal that its handler failed to take charge of."""
-        if goal.status is GoalStatus.ACCEPTED:
+        if goal.status is states.GoalStatus.ACCEPTED:
             goal.execute()
         if goal.status.active:
             goal.abort(self._type.Result())
 
     def _on_cancel(self, origin: Origin, request: CancelGoal_Request) -> None:
         info = request.goal_info
-        code, meant = self._table.to_cancel(from_uuid(info.goal_id), from_time(info.stamp))
-        canceling: list[GoalState] = []
+        code, meant = self._table.to_cancel(states.from_uuid(info.goal_id), states.from_time(info.stamp))
+        canceling: list[states.GoalState] = []
         for goal in meant:
             # Asked about this one or the one before, the handler may have ended it.
             agreed = goal.cancelable and self._agrees(self._handler.cancel, self._active[goal.id])
             if agreed and goal.cancelable:
-                self.update(goal, GoalEvent.CANCEL_GOAL)
+                self.update(goal, states.GoalEvent.CANCEL_GOAL)
                 canceling.append(goal)
         if meant and not canceling:
-            code = CancelCode.REJECTED
-        response = CancelGoal_Response(int(code), [goal_info(g.id, g.stamp) for g in canceling])
+            code = states.CancelCode.REJECTED
+        response = CancelGoal_Response(int(code), [states.goal_info(g.id, g.stamp) for g in canceling])
         self._cancel.reply(origin, codec.serialize(response))
 
     def _on_result(self, origin: Origin, request: Any) -> None:
-        id = from_uuid(request.goal_id)
+        id = states.from_uuid(request.goal_id)
         if id in self._active:
             self._waiting.setdefault(id, deque(maxlen=MAX_WAITING)).append(origin)
         elif id in self._results:
             self._result.reply(origin, self._results[id])
         else:
-            response = self._type.GetResult.Response(int(GoalStatus.UNKNOWN), self._type.Result())
+            response = self._type.GetResult.Response(int(states.GoalStatus.UNKNOWN), self._type.Result())
             self._result.reply(origin, codec.serialize(response))
 
     def _publish_status(self) -> None:
         self._news = False
-        goals = [StatusMessage(goal_info(g.id, g.stamp), int(g.status)) for g in self._table.reported()]
+        goals = [StatusMessage(states.goal_info(g.id, g.stamp), int(g.status)) for g in self._table.reported()]
         self._status.write(codec.serialize(GoalStatusArray(goals)))
         self._next_status = time.monotonic() + SPACING * len(goals)

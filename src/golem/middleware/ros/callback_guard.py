@@ -22,12 +22,7 @@ def log_error(text: str) -> None:
 
 
 class CallbackGuard:
-    """Keeps what callbacks raise, and logs each kind of it once, with its traceback.
-
-    Attributes:
-        count: how often a callback raised.
-        log: writes a line.
-    """
+    """Counts what callbacks raise, and logs each kind of it once, with its traceback."""
 
     def __init__(self, log: Callable[[str], None] = log_error) -> None:
         """Log lines by `log`, which shall not hold its caller up."""

@@ -95,12 +95,7 @@ class Codec:
     """Knows every type of one ROS 2 distribution, and GOLEM's."""
 
     def __init__(self, distro: str = DEFAULT_DISTRO) -> None:
-        """Know the standard types of `distro`.
-
-        Raises:
-            MissingExtra: rosbags is not installed.
-            ConfigError: there is no such distribution.
-        """
+        """Know the standard types of `distro`. Raises MissingExtra: no rosbags; ConfigError: no such distribution."""
         self._store = definitions.load(distro)
         self._types = cast(dict[str, Definition], self._store.fielddefs)
         self._classes: dict[str, type[Message]] = {}
@@ -135,31 +130,19 @@ class Codec:
         return self._classes[name]
 
     def service(self, name: str) -> ServiceType:
-        """Return the messages of a service, e.g. `"std_srvs/srv/SetBool"`.
-
-        Raises:
-            ConfigError: there is no such service.
-        """
+        """Return the messages of a service, e.g. `"std_srvs/srv/SetBool"`. Raises ConfigError: there is none."""
         self._known(f"{name}_Request", name)
         return ServiceType(name, self.message(f"{name}_Request"), self.message(f"{name}_Response"))
 
     def action(self, name: str) -> ActionType:
-        """Return the messages of an action, e.g. `"golem_interfaces/action/Pick"`.
-
-        Raises:
-            ConfigError: there is no such action.
-        """
+        """Return the messages of an action, e.g. `golem_interfaces/action/Pick`. Raises ConfigError: there is none."""
         self._known(f"{name}_Goal", name)
         goal, result, feedback = (self.message(f"{name}_{part}") for part in ("Goal", "Result", "Feedback"))
         services = self.service(f"{name}_SendGoal"), self.service(f"{name}_GetResult")
         return ActionType(name, goal, result, feedback, *services, self.message(f"{name}_FeedbackMessage"))
 
     def serialize(self, message: Message) -> bytes:
-        """Return the CDR of a message, little endian, padded to a multiple of four bytes.
-
-        Raises:
-            CodecError: a field does not hold what its definition says.
-        """
+        """Return a message's CDR, little endian, padded to four bytes. Raises CodecError: a field is not as defined."""
         name = message.__msgtype__
         compiled = self._compiled.get(name) or self._compile(name)
         try:
@@ -176,11 +159,7 @@ class Codec:
         return bytes(buffer)
 
     def deserialize(self, payload: Payload, kind: type[M]) -> M:
-        """Return the message of type `kind` that `payload` holds; its arrays are read-only views of `payload`.
-
-        Raises:
-            CodecError: the payload is no such message.
-        """
+        """Return the `kind` in `payload`, its arrays read-only views of that. Raises CodecError: it is none."""
         name = kind.__msgtype__
         if name not in self._compiled:
             self._compile(name)
@@ -190,22 +169,14 @@ class Codec:
             raise CodecError(f"{len(payload)} bytes are no {name}: {_reason(error)}.") from error
 
     def type_hash(self, name: str) -> str:
-        """Return the RIHS01 hash of a message, service or action (REP-2011).
-
-        Raises:
-            ConfigError: there is no such type.
-        """
+        """Return the RIHS01 hash of a message, service or action (REP-2011). Raises ConfigError: there is none."""
         self._known(name)
         if name not in self._hashes:
             self._hashes[name] = self._store.hash_rihs01(name)
         return self._hashes[name]
 
     def definition(self, name: str) -> str:
-        """Return the definition of a type, followed by those it uses, as bags carry it (`ros2msg`).
-
-        Raises:
-            ConfigError: there is no such type.
-        """
+        """Return a type's definition, then those it uses, as in bags (`ros2msg`). Raises ConfigError: no such type."""
         self._known(name)
         return definitions.text(name, self._types)
 
@@ -275,12 +246,7 @@ def _reason(error: Exception) -> str:
 
 @functools.cache
 def codec(distro: str = DEFAULT_DISTRO) -> Codec:
-    """Return the codec of a distribution; each is made once.
-
-    Raises:
-        MissingExtra: rosbags is not installed.
-        ConfigError: there is no such distribution.
-    """
+    """Return the codec of a distribution, made once. Raises MissingExtra: no rosbags; ConfigError: no such one."""
     return Codec(distro)
 
 

@@ -13,7 +13,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast, get_args
 
-from golem.errors import MissingExtra, unknown_name
+from golem.errors import needs, unknown_name
 from golem.middleware.dds.domain import Distro
 from golem.middleware.ros.message import ARRAY, BASE, NAME, SEQUENCE, Definition, Kind
 
@@ -71,10 +71,8 @@ def load(distro: str) -> Typestore:
         MissingExtra: rosbags is not installed.
         ConfigError: there is no such distribution.
     """
-    try:
+    with needs("rosbags", "dds"):
         from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-    except ImportError as error:
-        raise MissingExtra("rosbags", "dds") from error
     if distro not in get_args(Distro):
         raise unknown_name("ROS 2 distribution", distro, get_args(Distro))
     store = get_typestore(Stores[f"ROS2_{distro.upper()}"])

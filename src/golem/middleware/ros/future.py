@@ -19,11 +19,7 @@ class Future(Generic[T]):
     """A value to come. Not for threads: it is completed inside `poll`, by whoever spins the node."""
 
     def __init__(self, forget: Callable[[], None] = lambda: None) -> None:
-        """Start without a value.
-
-        Args:
-            forget: called when nobody wants the value any more.
-        """
+        """Start without a value; `forget` is called when nobody wants the value any more."""
         self._forget = forget
         self._value: T
         self._error: Exception | None = None
@@ -31,11 +27,7 @@ class Future(Generic[T]):
         self.done = False
 
     def result(self) -> T:
-        """Return the value.
-
-        Raises:
-            RosError: it did not arrive yet, or never will, and why.
-        """
+        """Return the value. Raises RosError: it did not arrive yet, or never will, and why."""
         if self._error is not None:
             raise self._error
         if not self.done:

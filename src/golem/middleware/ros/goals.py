@@ -113,11 +113,7 @@ MAX_REPORTED = 100
 
 
 def after(id: bytes, status: GoalStatus, event: GoalEvent) -> GoalStatus:
-    """Return what becomes of the goal with this `id` and `status` by `event`.
-
-    Raises:
-        RosError: it cannot happen in this state.
-    """
+    """Return the `status` of the goal with this `id` after `event`. Raises RosError: it cannot happen in this state."""
     if (status, event) not in TRANSITIONS:
         valid = ", ".join(e.value for s, e in TRANSITIONS if s is status) or "nothing"
         raise RosError(
@@ -127,13 +123,7 @@ def after(id: bytes, status: GoalStatus, event: GoalEvent) -> GoalStatus:
 
 
 class GoalState:
-    """One goal's state.
-
-    Attributes:
-        id: 16 bytes, chosen by the client.
-        stamp: when it was accepted [ns].
-        status: where it stands.
-    """
+    """One goal's state: its `id` of 16 bytes is chosen by the client; `stamp` is when it was accepted [ns]."""
 
     def __init__(self, id: bytes, stamp: int) -> None:
         """Accept the goal with this `id` at time `stamp` [ns]."""
@@ -146,11 +136,7 @@ class GoalState:
         return (self.status, GoalEvent.CANCEL_GOAL) in TRANSITIONS
 
     def update(self, event: GoalEvent) -> None:
-        """Let `event` happen.
-
-        Raises:
-            RosError: it cannot happen in the present state.
-        """
+        """Let `event` happen. Raises RosError: it cannot happen in the present state."""
         self.status = after(self.id, self.status, event)
 
 
@@ -200,11 +186,7 @@ class GoalTable:
         return CancelCode.NONE, [g for g in meant if g.cancelable]
 
     def update(self, goal: GoalState, event: GoalEvent, now: int) -> None:
-        """Let `event` happen to `goal` at time `now` [ns].
-
-        Raises:
-            RosError: it cannot happen in the goal's present state.
-        """
+        """Let `event` happen to `goal` at time `now` [ns]. Raises RosError: it cannot happen in its present state."""
         goal.update(event)
         if goal.status.terminal:
             self._ended.append((now, goal))

@@ -26,11 +26,7 @@ _RULE = "a name is made of tokens of letters, digits and '_' that do not start w
 
 
 def check_node(name: str) -> str:
-    """Return `name` if a node can be called so.
-
-    Raises:
-        ConfigError: it cannot.
-    """
+    """Return `name` if a node can be called so. Raises ConfigError: it cannot."""
     if not _TOKEN.fullmatch(name) or len(name) > MAX_NODE:
         raise ConfigError(
             f"'{name}' cannot be the name of a node: one token of letters, digits and '_', not starting with a "
@@ -40,11 +36,7 @@ def check_node(name: str) -> str:
 
 
 def check_namespace(namespace: str) -> str:
-    """Return `namespace` if nodes can live in it: `/` or an absolute name.
-
-    Raises:
-        ConfigError: they cannot.
-    """
+    """Return `namespace` if nodes can live in it: `/` or an absolute name. Raises ConfigError: they cannot."""
     return namespace if namespace == "/" else _check("namespace", namespace, MAX_NAMESPACE)
 
 

@@ -60,8 +60,7 @@ class DiscoveryInfo:
         self._writer.close()
 
     def _publish(self, nodes: list[Any]) -> None:
-        info = self._info(self._pad(self._participant.guid), nodes)
-        self._writer.write(self._codec.serialize(info))
+        self._writer.write(self._codec.serialize(self._info(self._pad(self._participant.guid), nodes)))
 
     def _pad(self, guid: bytes) -> Any:
         gid = self._gid()
@@ -97,12 +96,7 @@ class Linked(NamedTuple):
 
 
 class NodeEndpoints:
-    """Makes and closes the endpoints of a node.
-
-    Attributes:
-        waitset: what their samples go through.
-        guard: what users' callbacks are called by.
-    """
+    """Makes and closes a node's endpoints; samples go through `waitset`, callbacks are called by `guard`."""
 
     def __init__(self, participant: Participant, info: DiscoveryInfo, guard: CallbackGuard) -> None:
         """Make endpoints of `participant` and announce them by `info`; call users' callbacks by `guard`."""

@@ -22,11 +22,7 @@ class Publisher:
         self.writer = endpoints.writer(names.topic(name), type, qos)
 
     def publish(self, message: Any) -> None:
-        """Send one message.
-
-        Raises:
-            CodecError: it is not of the topic's type.
-        """
+        """Send one message. Raises CodecError: it is not of the topic's type."""
         self.writer.write(serialize(f"Topic '{self.name}'", message, self._kind))
 
     def matched(self) -> int:
@@ -39,11 +35,7 @@ class Publisher:
 
 
 class Subscription:
-    """Receives the messages of one topic.
-
-    Attributes:
-        malformed: samples that were no message of the topic's type.
-    """
+    """Receives the messages of one topic; `malformed` counts samples that were none of its type."""
 
     def __init__(
         self, endpoints: NodeEndpoints, name: str, type: str, callback: Callable[[Any], None] | None, qos: Qos

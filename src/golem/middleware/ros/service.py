@@ -16,9 +16,8 @@ from typing import Any, NamedTuple
 from golem.middleware.dds.base import Payload, Qos, Sample
 from golem.middleware.ros import codec, names
 from golem.middleware.ros.future import Future, RosError
-from golem.middleware.ros.message import CodecError
+from golem.middleware.ros.message import CodecError, Header, pack, unpack
 from golem.middleware.ros.node_endpoints import NodeEndpoints
-from golem.middleware.ros.request_header import Header, pack, unpack
 from golem.middleware.ros.typed import serialize
 from golem.middleware.rtps.submessages import FAST_DDS
 
@@ -47,11 +46,7 @@ class Origin(NamedTuple):
 
 
 class Client:
-    """Calls one service.
-
-    Attributes:
-        malformed: replies that could not be read.
-    """
+    """Calls one service; `malformed` counts replies that could not be read."""
 
     def __init__(self, endpoints: NodeEndpoints, name: str, type: str) -> None:
         self.name, self.malformed = name, 0
@@ -131,11 +126,7 @@ class Client:
 
 
 class Responder:
-    """The server's end of a service whose requests may be answered later.
-
-    Attributes:
-        malformed: requests that could not be read.
-    """
+    """Answers a service, maybe later; `malformed` counts requests that could not be read."""
 
     def __init__(self, endpoints: NodeEndpoints, name: str, type: str, handle: Callable[[Origin, Any], None]) -> None:
         """Give requests for the service with absolute `name` to `handle`, which shall `reply` some time."""

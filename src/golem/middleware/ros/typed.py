@@ -23,10 +23,6 @@ def check(where: str, message: Any, kind: type[Any]) -> None:
 
 
 def serialize(where: str, message: Any, kind: type[Any]) -> bytes:
-    """Return the CDR of `message`, which must be a `kind`; see `check`.
-
-    Raises:
-        CodecError: it is something else, or a field does not hold what its definition says.
-    """
+    """Return the CDR of `message`, a `kind`; see `check`. Raises CodecError: it is none, or not as defined."""
     check(where, message, kind)
     return codec.serialize(message)

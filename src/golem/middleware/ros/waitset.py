@@ -75,8 +75,7 @@ class Inbox:
 
     def open(self, participant: Source, topic: str, type: str, qos: Qos, user_data: str) -> None:
         """Create the reader of this inbox."""
-        reader = participant.reader(topic, type, qos, user_data, self._fill)
-        self._reader = reader
+        self._reader = participant.reader(topic, type, qos, user_data, self._fill)
         self._fill()  # what came before the line above was left in the reader
 
     def matched(self) -> int:

@@ -76,11 +76,7 @@ def own_endpoint(guid: bytes, topic: str, type_name: str, user_data: str, reliab
 
 
 def participant(sample: Data) -> Announced:
-    """Return what a participant says of itself.
-
-    Raises:
-        ValueError: it does not say where it is.
-    """
+    """Return what a participant says of itself. Raises ValueError: it does not say where it is."""
     ports: dict[int, int] = {}
     lease = 20.0
     for pid, value, order in _read(sample.payload):
@@ -97,11 +93,7 @@ def participant(sample: Data) -> Announced:
 
 
 def endpoint(sample: Data) -> tuple[bytes, str]:
-    """Return guid and topic of an endpoint of another participant.
-
-    Raises:
-        ValueError: it lacks one of them.
-    """
+    """Return guid and topic of an endpoint of another participant. Raises ValueError: it lacks one of them."""
     guid, topic = b"", ""
     for pid, value, order in _read(sample.payload):
         if pid == _ENDPOINT_GUID:

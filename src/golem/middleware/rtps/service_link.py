@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterable
 
 from golem.middleware.dds.base import Payload, Qos, Sample
 from golem.middleware.dds.domain import first_port
-from golem.middleware.ros.request_header import Header, pack, unpack
+from golem.middleware.ros.message import Header, pack, unpack
 from golem.middleware.rtps import announcements, submessages
 from golem.middleware.rtps.announcements import (
     KEYLESS_READER,
@@ -43,18 +43,10 @@ _MULTICAST_ALL = 49
 
 
 class ServiceLink:
-    """A participant that offers services to clients of Fast DDS.
-
-    Attributes:
-        malformed: datagrams of such clients that could not be read.
-    """
+    """Offers services to clients of Fast DDS; `malformed` counts datagrams that could not be read."""
 
     def __init__(self, domain: int, address: str) -> None:
-        """Listen for clients on the interface with this IPv4 address.
-
-        Raises:
-            OSError: the ports cannot be had.
-        """
+        """Listen for clients on the interface with this IPv4 address. Raises OSError: the ports cannot be had."""
         self.malformed = 0
         self._prefix = submessages.NO_VENDOR + os.urandom(10)
         self._group = _group_socket(first_port(domain), address)
@@ -264,11 +256,7 @@ class ServiceLink:
 
 
 class ServiceEndpoint:
-    """What is announced until it is closed.
-
-    Attributes:
-        guid: 16 bytes.
-    """
+    """What is announced, under a `guid` of 16 bytes, until it is closed."""
 
     def __init__(self, link: ServiceLink, guid: bytes) -> None:
         self._link, self.guid = link, guid

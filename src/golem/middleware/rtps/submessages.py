@@ -145,12 +145,7 @@ def _data(body: bytes, flags: int, order: str, prefix: bytes) -> Data:
 
 
 def parameters(data: bytes, at: int, order: str) -> tuple[list[tuple[int, bytes]], int]:
-    """Return the ids and values of a list of parameters that begins at `at`, and where it ends.
-
-    Raises:
-        ValueError: it does not end.
-        struct.error: it ends early.
-    """
+    """Return ids and values of the parameters from `at` on, and their end. Raises ValueError, struct.error: no end."""
     found: list[tuple[int, bytes]] = []
     while True:
         pid, length = struct.unpack_from(f"{order}HH", data, at)

@@ -22,12 +22,7 @@ from golem.middleware.wire.struct_layout import WireError, check_encapsulation
 
 
 class RpcServer:
-    """Offers one service.
-
-    Attributes:
-        refused: how many calls were not well-formed; nobody can answer those.
-        refusal: what was wrong with the last of them.
-    """
+    """Offers one service; `refused` counts calls that were not well-formed, `refusal` is about the last."""
 
     def __init__(self, requests: Reader, responses: Writer) -> None:
         self.refused, self.refusal = 0, ""
@@ -46,11 +41,7 @@ class RpcServer:
         return requests
 
     def reply(self, response: Response) -> None:
-        """Send an answer. Calls with `noreply` want none.
-
-        Raises:
-            WireError: it cannot be sent.
-        """
+        """Send an answer. Calls with `noreply` want none. Raises WireError: it cannot be sent."""
         self._writer.write(api.encode_response(response))
 
     def close(self) -> None:
@@ -71,11 +62,7 @@ class RpcClient:
         return self._writer.matched() > 0 and self._reader.matched() > 0
 
     def send(self, request: ApiRequest) -> None:
-        """Send a call.
-
-        Raises:
-            WireError: it cannot be sent.
-        """
+        """Send a call. Raises WireError: it cannot be sent."""
         self._writer.write(api.encode_request(request))
 
     def take(self) -> list[Response]:
@@ -161,22 +148,14 @@ def response_topic(service: str) -> str:
 
 
 def encode_request(request: ApiRequest) -> bytes:
-    """Return `request` as a `Request_`.
-
-    Raises:
-        WireError: a number is out of range, the parameter cannot be sent, or it is all too long.
-    """
+    """Return `request` as a `Request_`. Raises WireError: a number is out of range, or the text cannot be sent."""
     r = request
     header = _pack(_REQUEST_HEADER, REQUEST, r.id, r.api_id, r.lease, r.priority, r.noreply)
     return _encode(header, r.parameter, r.binary, REQUEST)
 
 
 def decode_request(payload: Payload) -> ApiRequest:
-    """Return the call in a `Request_`.
-
-    Raises:
-        WireError: it is not well-formed.
-    """
+    """Return the call in a `Request_`. Raises WireError: it is not well-formed."""
     numbers, text, binary = _decode(payload, _REQUEST_HEADER, REQUEST)
     number, api_id, lease, priority, noreply = numbers
     if noreply not in (0, 1):
@@ -185,21 +164,13 @@ def decode_request(payload: Payload) -> ApiRequest:
 
 
 def encode_response(response: Response) -> bytes:
-    """Return `response` as a `Response_`.
-
-    Raises:
-        WireError: a number is out of range, the data cannot be sent, or it is all too long.
-    """
+    """Return `response` as a `Response_`. Raises WireError: a number is out of range, or the text cannot be sent."""
     header = _pack(_RESPONSE_HEADER, RESPONSE, response.id, response.api_id, response.code)
     return _encode(header, response.data, response.binary, RESPONSE)
 
 
 def decode_response(payload: Payload) -> Response:
-    """Return the answer in a `Response_`.
-
-    Raises:
-        WireError: it is not well-formed.
-    """
+    """Return the answer in a `Response_`. Raises WireError: it is not well-formed."""
     (number, api_id, code), text, binary = _decode(payload, _RESPONSE_HEADER, RESPONSE)
     return Response(number, api_id, code, text, binary)
 

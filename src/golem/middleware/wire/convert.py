@@ -73,11 +73,7 @@ def decode_low_state(payload: Payload) -> LowState:
 
 
 def mode_machine(payload: Payload) -> int:
-    """Return the machine type that a `LowState_` reports, for the commands to the robot that sent it.
-
-    Raises:
-        WireError: encapsulation or length is wrong.
-    """
+    """Return the machine type that a `LowState_` reports, for commands to it. Raises WireError: a wrong payload."""
     return int(hg.LOW_STATE.read(payload)["mode_machine"])
 
 
@@ -146,11 +142,7 @@ def decode_low_command(payload: Payload, t: float, mode_machine: int = MODE_MACH
 
 
 def answered(payload: Payload) -> float:
-    """Return the time of the state that a `LowCmd_` answers [s]; 0 where its sender does not say.
-
-    Raises:
-        WireError: encapsulation or length is wrong.
-    """
+    """Return the time of the state that a `LowCmd_` answers [s], 0 for none. Raises WireError: a wrong payload."""
     hg.LOW_CMD.check(payload)
     return hg.ANSWERS.unpack_from(payload, hg.ANSWERS_AT)[0] / _TICKS
 
@@ -165,8 +157,7 @@ def rpy(quat: Array) -> tuple[float, float, float]:
     w, x, y, z = map(float, quat)
     roll = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
     pitch = math.asin(min(1.0, max(-1.0, 2.0 * (w * y - z * x))))
-    yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-    return roll, pitch, yaw
+    return roll, pitch, math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
 def _check(payload: Payload, layout: StructLayout, checksum: Checksum) -> None:

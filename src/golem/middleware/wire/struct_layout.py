@@ -52,13 +52,7 @@ def check_encapsulation(payload: Payload, type_name: str) -> None:
 
 
 class StructLayout:
-    """One message type of fixed size.
-
-    Attributes:
-        type_name: its name on the wire.
-        dtype: where its fields are, in a payload.
-        size: bytes of a payload.
-    """
+    """One message type of fixed `size`, in bytes of a payload, in which `dtype` says where its fields are."""
 
     def __init__(self, type_name: str, size: int, fields: Fields) -> None:
         """Describe the type whose CDR body has `size` bytes and `fields` at their offsets in the body."""
@@ -73,11 +67,7 @@ class StructLayout:
         return bytearray(ENCAPSULATION + bytes(self.size - len(ENCAPSULATION)))
 
     def check(self, payload: Payload) -> None:
-        """Check encapsulation and length of `payload`.
-
-        Raises:
-            WireError: one of them is wrong.
-        """
+        """Check encapsulation and length of `payload`. Raises WireError: one of them is wrong."""
         check_encapsulation(payload, self.type_name)
         # Cyclone pads every payload to a multiple of four.
         if len(payload) not in (self.size, -(-self.size // 4) * 4):

@@ -76,11 +76,7 @@ class WorkerProcess:
     """
 
     def __init__(self, key: Key, python: Path, scene: WorkerScene, layers: Layers) -> None:
-        """Start a worker under `python` and have it build `scene` from `layers`, which takes up to minutes.
-
-        Raises:
-            ConfigError: Isaac Lab does not run there.
-        """
+        """Start a worker under `python` that builds `scene`, in minutes. Raises ConfigError: Isaac Lab does not run."""
         self.key = key
         self._folder = tempfile.TemporaryDirectory(prefix="golem-isaaclab-")
         folder = Path(self._folder.name)
@@ -160,11 +156,7 @@ _idle: list[WorkerProcess] = []
 
 
 class WorkerLink:
-    """Exchanges requests and replies with a worker of its own until it is closed or nobody holds it any more.
-
-    Attributes:
-        versions: of the packages that the worker uses, by name.
-    """
+    """Exchanges messages with a worker, whose packages have `versions`, until it is closed or nobody holds it."""
 
     def __init__(self, python: Path, scene: WorkerScene, layers: Layers) -> None:
         """Take an idle worker that simulates the same, or start one, which takes up to minutes.
@@ -188,11 +180,7 @@ class WorkerLink:
         self._give_back = weakref.finalize(self, _keep, process)
 
     def ask(self, **fields: object) -> NDArray[np.void]:
-        """Send a request with `fields` of `request_type`, the others zero, and return the reply, one record.
-
-        Raises:
-            ServiceUnavailable: the worker has died.
-        """
+        """Send a `request_type` of `fields`, else zero; return the reply. Raises ServiceUnavailable: it has died."""
         return self._process.ask(fields)
 
     def close(self) -> None:

@@ -189,11 +189,7 @@ def _physics(backend: str) -> Any:
 
 
 def _order(wanted: list[str], present: list[str], what: str) -> list[int]:
-    """Return where in `present` each of the `wanted` names is.
-
-    Raises:
-        ValueError: they are not the same names.
-    """
+    """Return where in `present` each of the `wanted` names is. Raises ValueError: they are not the same names."""
     if sorted(wanted) != sorted(present):
         raise ValueError(f"Isaac Lab found other {what} than the scene has: {sorted(set(wanted) ^ set(present))}.")
     return [present.index(name) for name in wanted]

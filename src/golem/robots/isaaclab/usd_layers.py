@@ -42,7 +42,6 @@ class Prim:
         name: its name, unique among its siblings.
         schemas: names of the API schemas that are applied to it.
         properties: declaration, e.g. `float physics:mass` -> the value as text.
-        children: the prims below it.
     """
 
     kind: str

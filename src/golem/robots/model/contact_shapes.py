@@ -49,7 +49,6 @@ class Shape:
     """A collision primitive in its link's frame.
 
     Attributes:
-        link: the body it belongs to.
         kind: sphere, capsule, cylinder or box.
         size: (3,) as in MJCF [m]: radius; radius, half length; half extents.
         pos: (3,) centre [m].
@@ -121,8 +120,7 @@ def foot_box(side: Side) -> Shape:
     (x0, x1), (y0, y1), half = SOLE.x, SOLE.y, FOOT_THICKNESS / 2
     size = [(x1 - x0) / 2, (y1 - y0) / 2, half]
     center = [(x0 + x1) / 2, (y0 + y1) / 2, SOLE.z + half]
-    link = f"{side}_ankle_roll_link"
-    return _shape(link, _BOX, size, center, friction=FOOT_FRICTION, name=f"{side}_foot")
+    return _shape(f"{side}_ankle_roll_link", _BOX, size, center, friction=FOOT_FRICTION, name=f"{side}_foot")
 
 
 def hand_box(side: Side) -> Shape:

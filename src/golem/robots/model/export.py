@@ -33,11 +33,7 @@ class ExportConfig:
 
 
 def run_export(config: ExportConfig) -> None:
-    """Write the file, and say so.
-
-    Raises:
-        ConfigError, OutputError: see `export`.
-    """
+    """Write the file, and say so. Raises ConfigError, OutputError: see `export`."""
     export(config.format, config.hands, config.out)
     print(f"Wrote {config.out}")
 

@@ -16,11 +16,7 @@ _MIXED = tuple((int(np.argmax(joint.axis)) + 1) % 3 for joint in _ROWS[:6])
 
 
 def leg_poses(q: Array) -> tuple[Array, Array]:
-    """Return position (..., 2, 3) [m] and rotation (..., 2, 3, 3) of the left and right ankle_roll link in base_link.
-
-    Args:
-        q: (..., 12) leg joints in motor order [rad].
-    """
+    """Return position (..., 2, 3) [m], rotation (..., 2, 3, 3) of both ankle_roll links in base_link, `q` (..., 12)."""
     angles = q.reshape(*q.shape[:-1], 2, 6)
     c, s = np.cos(angles)[..., None], np.sin(angles)[..., None]
     R = np.zeros((*angles.shape[:-1], 3, 3))

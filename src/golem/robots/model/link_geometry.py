@@ -41,7 +41,6 @@ class LinkGeometry:
     """A link.
 
     Attributes:
-        name: of the link.
         parent: index of its parent in `RobotGeometry.links`, -1 for a root.
         T_parent_link: (4, 4) pose in the parent at zero angle; for a root, in the base.
         joint: name of the joint that moves it in its parent; empty when fixed.
@@ -134,11 +133,7 @@ def h12_geometry() -> RobotGeometry:
 
 
 def geometry_of(model: mujoco.MjModel, name: str, choice: GeometryChoice) -> RobotGeometry:
-    """Return the links of a compiled model.
-
-    Raises:
-        ConfigError: see `read_geometry`.
-    """
+    """Return the links of a compiled model. Raises ConfigError: see `read_geometry`."""
     roots = [b for b in range(1, model.nbody) if model.body_parentid[b] == 0]
     lone = roots[0] if len(roots) == 1 else None
     links: list[LinkGeometry] = []
@@ -190,11 +185,7 @@ def led(links: Sequence[LinkGeometry]) -> tuple[list[LinkGeometry], list[str]]:
 
 
 def with_surface(robot: RobotGeometry) -> RobotGeometry:
-    """Return the robot.
-
-    Raises:
-        ConfigError: none of its links has a surface.
-    """
+    """Return the robot. Raises ConfigError: none of its links has a surface."""
     if not any(link.parts for link in robot.links):
         raise ConfigError(
             f"'{robot.name}' has no geometry: none of its links has a mesh or a shape to cover with spheres."
@@ -224,11 +215,7 @@ def _moved(
 
 
 def _leader(model: mujoco.MjModel, joint: int) -> tuple[str, float, float]:
-    """Return the joint that an active equality lets `joint` follow, with ratio and offset; see `LinkGeometry`.
-
-    Raises:
-        ConfigError: it follows by a polynomial that is no line.
-    """
+    """Return the joint that `joint` follows, ratio and offset; see `LinkGeometry`. Raises ConfigError: no line."""
     for k in range(model.neq):
         if model.eq_type[k] != mujoco.mjtEq.mjEQ_JOINT or not model.eq_active0[k] or model.eq_obj1id[k] != joint:
             continue

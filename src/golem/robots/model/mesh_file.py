@@ -142,11 +142,7 @@ _NAMES = {
 
 
 def geom_mesh(model: mujoco.MjModel, geom: int) -> trimesh.Trimesh:
-    """Return the surface of one geom in the geom's own frame [m].
-
-    Raises:
-        NotImplementedError: a kind of geom no world here uses.
-    """
+    """Return the surface of a geom in its own frame [m]. Raises NotImplementedError: no world has such a kind."""
     import trimesh  # 40 MB, which a robot that only runs does without
 
     kind = mujoco.mjtGeom(int(model.geom_type[geom]))

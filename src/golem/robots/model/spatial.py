@@ -51,8 +51,7 @@ def quat_of(rotation: Array) -> Array:
 def quat_to_axis(axis: Array) -> Array:
     """Return the (4,) quaternion, wxyz, of a frame whose x axis has the direction of `axis` (3,)."""
     x = axis / np.linalg.norm(axis)
-    other = np.eye(3)[int(np.argmin(np.abs(x)))]
-    y = np.cross(x, other)
+    y = np.cross(x, np.eye(3)[int(np.argmin(np.abs(x)))])
     y /= np.linalg.norm(y)
     return quat_of(np.column_stack([x, y, np.cross(x, y)]).astype(np.float64))
 

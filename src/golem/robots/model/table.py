@@ -37,14 +37,7 @@ class Limits:
 
 
 def load_limits(profile: str = "urdf") -> Limits:
-    """Return the limits of the 27 joints.
-
-    Args:
-        profile: `"urdf"` or `"paper"`, which differ in the torque only.
-
-    Raises:
-        ConfigError: no such profile.
-    """
+    """Return the limits of the 27 joints, of `"urdf"` or `"paper"`: other torques. Raises ConfigError: no such one."""
     if profile not in TORQUE_PROFILES:
         raise unknown_name("torque limit profile", profile, TORQUE_PROFILES)
     torque = [j.torque[profile] for j in JOINTS]

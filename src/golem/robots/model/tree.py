@@ -17,12 +17,7 @@ from golem.types import NUM_JOINTS, SIDES, Array
 
 @dataclass(frozen=True, slots=True)
 class Edge:
-    """One frame in another.
-
-    Attributes:
-        parent, child: names of the frames.
-        T_parent_child: (4, 4) pose, at zero angle where a hinge is between them.
-    """
+    """One frame in another, with its (4, 4) pose, at zero angle where a hinge is between them."""
 
     parent: str
     child: str
@@ -31,12 +26,7 @@ class Edge:
 
 @dataclass(frozen=True, slots=True)
 class Hinge(Edge):
-    """A link on a hinge.
-
-    Attributes:
-        joint: name of the hinge.
-        axis: (3,) unit vector in the child.
-    """
+    """A link on a hinge, whose `axis` is a (3,) unit vector in the child."""
 
     joint: str
     axis: Array
@@ -89,11 +79,7 @@ def angles(q: Array, fingers: tuple[Array, Array]) -> Array:
 
 
 def poses(angle: Array) -> Array:
-    """Return the (n, 4, 4) pose of every hinge's child in its parent, in the order of `HINGES`.
-
-    Args:
-        angle: of every hinge [rad]; see `angles`.
-    """
+    """Return the (n, 4, 4) pose of every child in its parent, in the order of `HINGES`, at `angle` (n,) [rad]."""
     s, c = np.sin(angle)[:, None, None], np.cos(angle)[:, None, None]
     T = _T_PARENT_CHILD.copy()
     # Rodrigues' formula.

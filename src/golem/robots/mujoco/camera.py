@@ -154,5 +154,4 @@ class CameraRig(AbstractContextManager["CameraRig", None]):
             self._context = None
 
     def __exit__(self, *_: object) -> None:
-        """Close the rig."""
         self.close()

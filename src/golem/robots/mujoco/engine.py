@@ -221,7 +221,6 @@ class MujocoRobot:
         return self._pushes.acting
 
     def advance(self, command: LowCommand, hands: dict[Side, HandCommand], dt: float) -> None:
-        """Let time pass; see `Robot`."""
         self._memory["fine"] = fine = twin_stages.delicate(self._memory[0])
         step = FINE_STEP if fine else COARSE_STEP
         self._model.opt.timestep = step
@@ -251,7 +250,6 @@ class MujocoRobot:
         return self._motors.measure(self.data)
 
     def imu(self) -> Imu:
-        """Return the present IMU sample; see `Robot`."""
         # MuJoCo's sensors describe the beginning of the last step. Orientation and rate must be of the encoders'
         # instant: 2 ms apart they make planted feet seem to move by a centimetre per second.
         base, torso = self._base, self._torso
@@ -264,11 +262,9 @@ class MujocoRobot:
         return self._imu_model.measure(quat, gyro, self.data.sensordata[self._acc])
 
     def hand(self, side: Side, t: float) -> HandState:
-        """Return what one hand reports; see `Robot`."""
         return self._hands[side].read(self.data, t)
 
     def capture(self, camera: str) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
-        """Expose one camera now; see `Robot`."""
         if self._rig is None:
             lenses = self._errors.intrinsics
             self._rig = CameraRig(
@@ -343,11 +339,7 @@ def _hanging(posture: Array) -> Array:
 
 
 def standing_height(posture: Array) -> float:
-    """Return the height of base_link [m] at which the lower sole touches the floor, base upright.
-
-    Args:
-        posture: (27,) joint positions [rad].
-    """
+    """Return the height of base_link [m], upright, with the lower sole on the floor; `posture` is (27,) [rad]."""
     return -float(sole_centers(*leg_poses(posture[LEGS]))[:, 2].min())
 
 

@@ -60,11 +60,7 @@ def apply_pushes(m: Record, xfrc: int, xpos: int, xmat: int, xipos: int) -> None
 
 
 class Pushes:
-    """External forces, each constant in the world until it is changed.
-
-    Attributes:
-        memory: a `PUSHES`.
-    """
+    """External forces, each constant in the world until it is changed; `memory` is a `PUSHES`."""
 
     def __init__(self, model: mujoco.MjModel, memory: Records | None = None) -> None:
         """Push bodies of `model`; there is no force yet. `memory`, a `PUSHES`, None for one of its own."""
@@ -173,11 +169,7 @@ def pull(h: Record, time: float, sway_x: float, sway_y: float, qpos: int, qvel: 
 
 
 class Hoist:
-    """Spring and damper between the pelvis and the hook, preloaded with the robot's weight.
-
-    Attributes:
-        memory: a `HOIST`.
-    """
+    """Spring and damper from pelvis to hook, preloaded with the robot's weight; `memory` is a `HOIST`."""
 
     def __init__(self, model: mujoco.MjModel, config: HoistConfig, memory: Records | None = None) -> None:
         """Hang `pelvis` of `model` from its free joint `base`; `memory`, a `HOIST`, None for one of its own."""

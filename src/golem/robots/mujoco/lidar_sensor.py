@@ -18,17 +18,8 @@ from golem.robots.model.imu_mount import torso_motion
 from golem.robots.model.table import BASE_LINK, FRAMES
 from golem.robots.mujoco.ray_kernel import KNOWN, carried, cast, shaken
 from golem.robots.mujoco.scene import Scene
+from golem.robots.sensors import mid360
 from golem.robots.sensors.imu import ImuModel
-from golem.robots.sensors.mid360 import (
-    IMU_PERIOD,
-    P_LIDAR_IMU,
-    POINT_RATE,
-    SCAN,
-    TURNS,
-    directions,
-    draw_mount,
-    lidar_errors,
-)
 from golem.robots.sensors.streams import stream
 from golem.robots.worlds.parts import COLLISION_GROUP
 from golem.types import Array
@@ -139,12 +130,7 @@ _GROUPS: NDArray[np.uint8] = np.array([1, 1, 0, 0, 0, 0], dtype=np.uint8)
 
 @dataclass(frozen=True, slots=True)
 class LidarMoment:
-    """One instant of a simulation, as far as the LiDAR sees it.
-
-    Attributes:
-        t: time [s].
-        qpos, qvel: state of the twin's model.
-    """
+    """One instant `t` [s] of a simulation, as far as the LiDAR sees it: the state of the twin's model."""
 
     t: float
     qpos: Array
@@ -172,9 +158,9 @@ class LidarSensor:
         Raises:
             ConfigError: there is no such profile.
         """
-        errors = lidar_errors(profile)
+        errors = mid360.lidar_errors(profile)
         self.errors = errors if dropout is None else replace(errors, dropout=dropout)
-        self.mount = draw_mount(profile, seed) if mount is None else mount
+        self.mount = mid360.draw_mount(profile, seed) if mount is None else mount
         self._model = model = visible(scene.model)
         self._data = mujoco.MjData(model)
         self._shapes, self._others = seen_shapes(model)
@@ -185,7 +171,7 @@ class LidarSensor:
         self._q, self._v = int(base.qposadr[0]), int(base.dofadr[0])
         self._waist, self._waist_v = int(waist.qposadr[0]), int(waist.dofadr[0])
         self._T_torso_lidar = FRAMES["lidar_link"].T_parent_frame @ self.mount
-        self._arm: Array = self._T_torso_lidar[:3, 3] + self._T_torso_lidar[:3, :3] @ P_LIDAR_IMU
+        self._arm: Array = self._T_torso_lidar[:3, 3] + self._T_torso_lidar[:3, :3] @ mid360.P_LIDAR_IMU
         self._gravity: Array = model.opt.gravity.copy()
         self._imu_model = ImuModel(
             errors.imu, errors.imu.draw_bias(stream(seed, "lidar/bias")), stream(seed, "lidar/imu")
@@ -206,13 +192,13 @@ class LidarSensor:
         self._moments.append(moment)
         while len(self._moments) > 1 and self._next_imu <= moment.t + 1e-9:
             self._sample(self._next_imu)
-            self._next_imu = round(self._next_imu + IMU_PERIOD, 6)
-        if moment.t >= self._next_scan + SCAN - 1e-9:
+            self._next_imu = round(self._next_imu + mid360.IMU_PERIOD, 6)
+        if moment.t >= self._next_scan + mid360.SCAN - 1e-9:
             start = self._next_scan
             # One moment more than the scan is long: each stands for the time around it.
             track = [m for m in self._moments if m.t > start - 1e-9]
-            self._scans.append((start + SCAN, self._worker.submit(self._scan, start, track, self._draw())))
-            self._next_scan = round(self._next_scan + SCAN, 6)
+            self._scans.append((start + mid360.SCAN, self._worker.submit(self._scan, start, track, self._draw())))
+            self._next_scan = round(self._next_scan + mid360.SCAN, 6)
             while len(self._moments) > 2 and self._moments[1].t <= self._next_scan:
                 self._moments.popleft()
 
@@ -238,7 +224,7 @@ class LidarSensor:
         q, v = between(*self._motion(early), *self._motion(late), self._arm, share)
         if self._before is not None:
             mount = self._T_torso_lidar[:3, :3]
-            rate, force = sensed(*self._before, q, v, mount, self._gravity, IMU_PERIOD)
+            rate, force = sensed(*self._before, q, v, mount, self._gravity, mid360.IMU_PERIOD)
             told = self._imu_model.measure(_UPRIGHT, rate, force)
             self._imu.append(LidarImu(t, told.gyro, told.acc))
         self._before = q, v
@@ -253,21 +239,24 @@ class LidarSensor:
 
     def _draw(self) -> tuple[Array, Array]:
         """Draw the errors of one scan: (n, 3) of range and direction, and (n,) for the losses."""
-        n = round(SCAN * POINT_RATE)
+        n = round(mid360.SCAN * mid360.POINT_RATE)
         return self._rng.standard_normal((n, 3)), self._rng.random(n)
 
     def _scan(self, start: float, track: list[LidarMoment], draws: tuple[Array, Array]) -> LidarScan:
         """Cast one scan; runs on the worker."""
         noise, lost = draws
         n, errors, data = len(noise), self.errors, self._data
-        offsets = np.arange(1, n + 1) / POINT_RATE
-        rays = directions(start + offsets)
+        offsets = np.arange(1, n + 1) / mid360.POINT_RATE
+        rays = mid360.directions(start + offsets)
         if errors.direction_noise > 0.0:
             rays_true = shaken(rays, noise, errors.direction_noise)
         else:
             rays_true = rays
         distance = np.empty(n)
-        azimuth, slack = (2.0 * np.pi * np.mod(TURNS * (start + offsets), 1.0), SLACK + 6.0 * errors.direction_noise)
+        azimuth, slack = (
+            2.0 * np.pi * np.mod(mid360.TURNS * (start + offsets), 1.0),
+            SLACK + 6.0 * errors.direction_noise,
+        )
         times = np.array([m.t for m in track]) - start
         edges = np.searchsorted(offsets, 0.5 * (times[1:] + times[:-1]))
         edges = np.concatenate([[0], edges, [n]])
@@ -285,7 +274,7 @@ class LidarSensor:
             origin = data.xpos[self._torso] + R_torso @ self._T_torso_lidar[:3, 3]
             # Directions turn with the sensor between the moments; its place is that of the nearest moment.
             world = carried(rays_true[part], self._rate(moment), offsets[part] - times[i], R)
-            half = np.pi * TURNS * count / POINT_RATE
+            half = np.pi * mid360.TURNS * count / mid360.POINT_RATE
             middle = float(azimuth[part.start]) + half
             wedge = np.array([math.atan2(math.sin(middle), math.cos(middle)), half + slack])
             cast(origin, R, wedge, world, self._shapes, self._kinds, self._model.geom_size, self._model.geom_rbound,
@@ -295,7 +284,7 @@ class LidarSensor:
         ranges = distance + errors.range_noise * noise[:, 0]
         kept = (distance >= 0.0) & (distance > errors.near) & (distance < errors.far) & (lost >= errors.dropout)
         points = (rays[kept] * ranges[kept, None]).astype(np.float32)
-        return LidarScan(start + SCAN, points, offsets[kept].astype(np.float32), SCAN)
+        return LidarScan(start + mid360.SCAN, points, offsets[kept].astype(np.float32), mid360.SCAN)
 
     def _cast_others(self, origin: Array, rays: Array, distance: Array) -> None:
         """Let MuJoCo cast rays (n, 3) against shapes that the kernel does not know; `distance` (n,) gets the nearer."""

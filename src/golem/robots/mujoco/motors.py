@@ -168,12 +168,7 @@ def _pushes(m: Record, i: int, dt: float) -> bool:
 
 
 class Motors:
-    """Drives of the motors; the first 27 actuators of the model.
-
-    Attributes:
-        memory: a `MOTORS`.
-        tau: (27,) torque of the last physics step [N m].
-    """
+    """Drives of the model's first 27 actuators; `tau` (27,) is of the last step [N m], `memory` a `MOTORS`."""
 
     def __init__(
         self,

@@ -86,11 +86,7 @@ class Motion:
 
 
 class JointMap:
-    """Which entries of a model's data belong to another engine's joints, in that engine's order.
-
-    Attributes:
-        q, v: (n,) indices into `qpos` and `qvel`.
-    """
+    """Indices (n,) into a model's `qpos` and `qvel` of another engine's joints, in that engine's order."""
 
     def __init__(self, model: mujoco.MjModel, joints: np.ndarray) -> None:
         """Map `joints` (n,), ids of the model in the engine's order."""

@@ -80,12 +80,9 @@ class Scene:
     """A compiled world with its robot.
 
     Attributes:
-        model: the model.
         names: what the pack added; nothing in a world without one.
-        layout: where the pack stands.
         nominal: where it would under nominal conditions, for a robot at its place.
         draws: the loosened screws.
-        people: those who walk about.
         conditions: what of the work place differs from the nominal one.
         kitchen: what stands in a kitchen; None elsewhere.
         seal: the gasket of its fridge.
@@ -240,11 +237,7 @@ def read_robot(path: Path) -> mujoco.MjSpec:
 
 
 def foreign_robot(path: Path) -> mujoco.MjSpec:
-    """Return the robot of `read_robot` with our hands, cameras and names, its limbs touching the world only.
-
-    Raises:
-        ConfigError: see `read_robot`.
-    """
+    """Return the robot of `read_robot`, and raise as it, with our hands, cameras, names; limbs touch the world only."""
     spec = read_robot(path)
     _strip_world(spec)
     for element in (*spec.sensors, *spec.cameras):

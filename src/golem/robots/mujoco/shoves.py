@@ -40,12 +40,7 @@ class Push:
     shape: Literal["constant", "half_sine", "ramp"]
 
     def force(self, elapsed: float, yaw: float) -> Array:
-        """Return the (3,) force in the world [N].
-
-        Args:
-            elapsed: time since the push began [s].
-            yaw: heading of the robot when it began [rad].
-        """
+        """Return the (3,) force in the world [N], `elapsed` [s] after the push began at a heading of `yaw` [rad]."""
         if not 0.0 <= elapsed < self.duration:
             return np.zeros(3)
         share = elapsed / self.duration
@@ -91,11 +86,7 @@ class Pushable(Protocol):
 
 
 class Pusher:
-    """Pushes one twin, one push at a time.
-
-    Attributes:
-        force: (3,) present force in the world [N].
-    """
+    """Pushes one twin, one push at a time; `force` (3,) is the present one in the world [N]."""
 
     def __init__(self, robot: Pushable) -> None:
         self._robot = robot

@@ -63,12 +63,7 @@ class Shot:
 
 @dataclass(frozen=True)
 class BodyMesh:
-    """The visible part of one body.
-
-    Attributes:
-        name: the body; `"world"` for all that cannot move.
-        glb: binary glTF in the body's frame.
-    """
+    """The visible part of the body `name`, `"world"` for all that cannot move: binary glTF in its frame."""
 
     name: str
     glb: bytes

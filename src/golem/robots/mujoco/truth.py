@@ -20,13 +20,7 @@ TOUCH = 1.0
 
 @dataclass(frozen=True, slots=True)
 class BaseTruth:
-    """Pose and velocity of base_link.
-
-    Attributes:
-        T_world_base: (4, 4).
-        velocity: (3,) of its origin in the world [m/s].
-        rate: (3,) angular, in base_link [rad/s].
-    """
+    """Pose (4, 4), velocity (3,) in the world [m/s] and rate (3,) in base_link [rad/s] of base_link."""
 
     T_world_base: Array
     velocity: Array

@@ -55,11 +55,7 @@ _NUMBERS: dict[str, Any] = {
 
 @cache
 def struct(name: str) -> type[ctypes.Structure]:
-    """Return the C struct called `name`, as the bindings describe it.
-
-    Raises:
-        KeyError: it, or the type of one of its fields, is not described.
-    """
+    """Return the C struct called `name`, by the bindings. Raises KeyError: it or a field's type is unknown."""
     described: Any = structs.STRUCTS[name]
     fields = [(field.name, _kind(field.type)) for field in described.fields]
     return type(name, (ctypes.Structure,), {"_fields_": fields})

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import mujoco
 import numpy as np
 
-from golem.errors import ConfigError, MissingExtra
+from golem.errors import ConfigError, needs
 from golem.robots.model.spatial import quat_to_axis
 from golem.robots.model.table import BASE_LINK
 from golem.robots.mujoco import other_engine
@@ -22,17 +22,11 @@ _ALONG_X = np.array([np.sqrt(0.5), 0.0, -np.sqrt(0.5), 0.0])
 
 
 def load_sapien() -> Any:
-    """Return the module `sapien`, with which PhysX comes.
-
-    Raises:
-        MissingExtra: it is not installed.
-    """
-    try:
+    """Return the module `sapien`, with which PhysX comes. Raises MissingExtra: it is not installed."""
+    with needs("sapien", "physx"):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # that there is no Vulkan: nothing is rendered with it
             return importlib.import_module("sapien")
-    except ImportError as error:
-        raise MissingExtra("sapien", "physx") from error
 
 
 @dataclass(frozen=True)
@@ -40,7 +34,6 @@ class PhysxBodies:
     """A world in PhysX, and which body of the MuJoCo model is what.
 
     Attributes:
-        system: the PhysX system.
         articulation: the robot.
         links: body of the model -> link.
         joints: (n,) joints of the model in the articulation's order.

@@ -65,19 +65,13 @@ class Log:
     States and hands have the time at which they were recorded, images that of their exposure. Both are the domain's.
 
     Attributes:
-        cameras: those that were recorded.
         calibration: per camera the (4, 4) pose of its optical frame, as the recorded robot's calibration claims it, in
             that of the nominal model.
-        pictures: what each camera saw.
         end: time of the last state; None until it has been read.
     """
 
     def __init__(self, path: Path) -> None:
-        """Open the bag at `path`.
-
-        Raises:
-            BagError: there is none, it or a message in it is damaged, or it holds no state of a robot.
-        """
+        """Open the bag at `path`. Raises BagError: it is absent, damaged, or holds no state of a robot."""
         self._bag = bag = Bag(path)
         if STATE not in bag.topics:
             raise BagError(
@@ -172,31 +166,19 @@ class ReplayRobotConfig:
 
 
 class ReplayRobot:
-    """The robot in a bag; see `golem.robots.base.Robot`.
-
-    Its first state is at time 0. Commands move nothing.
-    """
+    """The robot in a bag; see `golem.robots.base.Robot`. It begins at time 0, and commands move nothing."""
 
     unmoved = "it is a recording"
 
     def __init__(self, config: ReplayRobotConfig) -> None:
-        """Open the bag.
-
-        Raises:
-            BagError: there is none, it is damaged, or it holds no state of a robot.
-            MissingExtra: the extra `record` is not installed.
-        """
+        """Open the bag. Raises BagError: absent, damaged or without state; MissingExtra: `record` is not there."""
         self._file = config.file
         self._log = Log(config.file)
         self._t = 0.0
         self.cameras, self.calibration = self._log.cameras, self._log.calibration
 
     def advance(self, command: LowCommand, hands: dict[Side, HandCommand], dt: float) -> None:
-        """Let time pass; the commands go nowhere.
-
-        Raises:
-            RobotGone: the recording is over.
-        """
+        """Let time pass; the commands go nowhere. Raises RobotGone: the recording is over."""
         self._t += dt
         self._log.read(self._t)
         if self._log.end is not None and self._t > self._log.end + dt / 2.0:

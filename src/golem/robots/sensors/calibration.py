@@ -138,11 +138,7 @@ class Calibration:
         return math.sqrt(float(np.linalg.eigvalsh(J @ self.covariances[camera] @ J.T).max()))
 
     def save(self, path: Path) -> None:
-        """Write it.
-
-        Raises:
-            OutputError: it cannot be written.
-        """
+        """Write it. Raises OutputError: it cannot be written."""
         rows: dict[str, Any] = {
             "cameras": {
                 name: {"pose": T.tolist(), "covariance": self.covariances[name].tolist()}
@@ -166,11 +162,7 @@ class Calibration:
 
 
 def read_calibration(path: Path) -> Calibration:
-    """Read what `Calibration.save` wrote.
-
-    Raises:
-        ConfigError: it cannot be read, or is none.
-    """
+    """Read what `Calibration.save` wrote. Raises ConfigError: it cannot be read, or is none."""
     try:
         rows: Any = json.loads(path.read_text(encoding="utf-8"))
         cameras = {name: np.array(row["pose"], float) for name, row in rows["cameras"].items()}
@@ -229,9 +221,5 @@ class CalibrationPart:
     file: Path | None = None
 
     def load(self) -> Calibration:
-        """Return it.
-
-        Raises:
-            ConfigError: the file cannot be read, or is no calibration.
-        """
+        """Return it. Raises ConfigError: the file cannot be read, or is no calibration."""
         return Calibration() if self.file is None else read_calibration(self.file)

@@ -25,11 +25,7 @@ T_MUJOCO_OPTICAL.setflags(write=False)
 
 @lru_cache(maxsize=16)
 def rays(info: CameraInfo) -> NDArray[np.float32]:
-    """Return the viewing ray of every pixel, scaled so that ray times depth is the point.
-
-    Returns:
-        (height, width, 3) read-only, in the optical frame, third component 1.
-    """
+    """Return each pixel's ray in the optical frame, (height, width, 3), read-only: times depth it is the point."""
     u, v = np.meshgrid(np.arange(info.width), np.arange(info.height))
     out = np.empty((info.height, info.width, 3), np.float32)
     out[..., 0] = (u - info.cx) / info.fx
@@ -40,13 +36,10 @@ def rays(info: CameraInfo) -> NDArray[np.float32]:
 
 
 def project(info: CameraInfo, points: Array) -> Array:
-    """Return the pixels of points.
+    """Return the pixels of points, (..., 2) x, y [px], not clipped to the image.
 
     Args:
         points: (..., 3) in the optical frame [m], z > 0.
-
-    Returns:
-        (..., 2) x, y [px]; not clipped to the image.
     """
     p = np.asarray(points, np.float64)
     return p[..., :2] / p[..., 2:] * (info.fx, info.fy) + (info.cx, info.cy)

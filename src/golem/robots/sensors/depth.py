@@ -84,14 +84,11 @@ class StereoDepth:
         self._oblique = np.float32(np.cos(errors.grazing) ** 2) * (ray * ray).sum(axis=2)
 
     def measure(self, depth: Image, specular: NDArray[np.bool_] | None = None) -> Image:
-        """Return what the camera reports for one frame.
+        """Return what the camera reports for one frame, (height, width) float32 [m], 0 where there is no depth.
 
         Args:
             depth: (height, width) true distance along the optical axis [m].
             specular: (height, width) True where the surface is a mirror-like one; None: nowhere.
-
-        Returns:
-            (height, width) float32 [m], 0 where there is no depth.
         """
         e = self._errors
         valid = (depth >= self._info.near) & (depth <= self._info.far)
@@ -120,8 +117,7 @@ class StereoDepth:
         """Return (height, width) disparity noise [px]."""
         e = self._errors
         # Sum of four uniform bytes: normal to within 0.3 of excess kurtosis, at a third of the cost.
-        shape = (self._info.height, self._info.width)
-        word = self._rng.integers(0, 2**32, shape, dtype=np.uint32)
+        word = self._rng.integers(0, 2**32, (self._info.height, self._info.width), dtype=np.uint32)
         pair = word & np.uint32(0x00FF00FF)
         word >>= np.uint32(8)
         word &= np.uint32(0x00FF00FF)
@@ -140,8 +136,7 @@ class StereoDepth:
         height, width, patch = self._info.height, self._info.width, self._errors.patch
         nodes = (-(-width // patch) + 1, -(-height // patch) + 1)
         grid = self._rng.standard_normal(nodes, dtype=np.float32)
-        columns = np.ascontiguousarray(_stretch(grid, patch)[:width].T)
-        return _stretch(columns, patch)[:height]
+        return _stretch(np.ascontiguousarray(_stretch(grid, patch)[:width].T), patch)[:height]
 
     def _lost_patches(self) -> NDArray[np.bool_]:
         """Return (height, width) True on blotches that cover the share `specular_loss`."""

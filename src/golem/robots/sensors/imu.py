@@ -100,11 +100,7 @@ def _measure(imu: int, quat: Array, gyro: Array, acc: Array, sample: int) -> Non
 
 
 class ImuModel:
-    """Adds bias and white noise to clean samples, one call per sample.
-
-    Attributes:
-        memory: an `IMU`.
-    """
+    """Adds bias and white noise to clean samples, one call per sample; `memory` is an `IMU`."""
 
     def __init__(
         self, errors: ImuErrors, bias: ImuBias, rng: np.random.Generator, memory: Records | None = None

@@ -82,11 +82,7 @@ LIDAR_PROFILES: dict[str, LidarErrors] = {
 
 
 def lidar_errors(profile: str) -> LidarErrors:
-    """Return the errors of a realism profile.
-
-    Raises:
-        ConfigError: there is no profile of that name.
-    """
+    """Return the errors of a realism profile. Raises ConfigError: there is no profile of that name."""
     if profile not in LIDAR_PROFILES:
         raise unknown_name("profile", profile, LIDAR_PROFILES)
     return LIDAR_PROFILES[profile]
@@ -99,14 +95,7 @@ def draw_mount(profile: str, seed: int) -> Array:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def directions(t: Array) -> Array:
-    """Return where the sensor looks.
-
-    Args:
-        t: (n,) times of the points [s].
-
-    Returns:
-        (n, 3) unit vectors in lidar_link.
-    """
+    """Return where the sensor looks at (n,) times `t` [s], (n, 3) unit vectors in lidar_link."""
     out = np.empty((len(t), 3))
     low, high = ELEVATION
     for i in range(len(t)):

@@ -40,11 +40,7 @@ class MotorErrors:
 
 
 def per_joint(values: object) -> Array:
-    """Return the (27,) `values`, a mapping by joint, in motor order; 0 where a joint is not named.
-
-    Raises:
-        ConfigError: they are none, or one is no small number.
-    """
+    """Return `values` by joint in motor order, (27,), 0 for those not named. Raises ConfigError: no small numbers."""
     if not isinstance(values, dict):
         raise ConfigError(f"Zeros and torque gains are mappings by joint, not {values!r}.")
     out = np.zeros(NUM_JOINTS)
@@ -255,12 +251,7 @@ class EpisodeErrors:
 
 
 def sample_episode(profile: RealismProfile, rng: np.random.Generator) -> EpisodeErrors:
-    """Draw the errors of one episode.
-
-    Args:
-        profile: magnitudes.
-        rng: e.g. `stream(seed, "episode")`; each kind of error draws from a child of it.
-    """
+    """Draw the errors of one episode; each kind draws from a child of `rng`, e.g. `stream(seed, "episode")`."""
     cameras, joints, imu, hoist, lenses, gears = rng.spawn(6)
     sigma = np.zeros(NUM_JOINTS)
     sigma[LEGS] = profile.leg_offset

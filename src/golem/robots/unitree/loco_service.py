@@ -120,18 +120,10 @@ FORM: Final = "0"
 
 
 class MotionSwitcher:
-    """Answers calls.
-
-    Attributes:
-        mode: the mode in charge; empty after a release.
-    """
+    """Answers calls; `mode` is the mode in charge, empty after a release."""
 
     def __init__(self, loco: LocoService | None = None) -> None:
-        """Begin in the one mode there is.
-
-        Args:
-            loco: the service that runs in it; None if this robot has no leg controller of its own.
-        """
+        """Begin in the one mode there is, in which `loco` runs; None if the robot has no leg controller of its own."""
         self.mode = MODE
         self._loco = loco
 

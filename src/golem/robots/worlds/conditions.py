@@ -113,11 +113,7 @@ NAMES = tuple(f.name for f in fields(Conditions))
 
 
 def check_condition(name: str, value: object) -> Value:
-    """Return a condition's value as it is used.
-
-    Raises:
-        ConfigError: there is no such condition, or it cannot have this value.
-    """
+    """Return a condition's value as it is used. Raises ConfigError: there is none such, or it cannot be that."""
     if name not in NAMES:
         raise unknown_name("condition", name, NAMES)
     if name in CHOICES:

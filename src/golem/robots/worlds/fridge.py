@@ -65,12 +65,7 @@ class FridgeLayout:
 
 @dataclass(frozen=True, slots=True)
 class Seal:
-    """The gasket's pull on the door.
-
-    Attributes:
-        dof, qpos: where the hinge is in the model's velocities and positions.
-        torque: that it takes to break it [N m].
-    """
+    """The gasket's pull on the door, broken by `torque` [N m]; `dof`, `qpos` are where the hinge is in the model."""
 
     dof: int
     qpos: int

@@ -21,14 +21,19 @@ RIM = 0.857
 _TRAYS: tuple[tuple[str, Kind, tuple[float, float, float]], ...] = (
     ("tray", "screw", (0.145, -0.28, 0.0)),
     ("tray_nuts", "nut", (0.145, -0.55, 0.0)),
-    ("tray_left", "screw", (0.45, 0.81, np.pi / 2)),
-    ("tray_left_nuts", "nut", (0.72, 0.81, np.pi / 2)),
+    ("tray_near_left", "screw", (0.145, 0.35, 0.0)),
+    ("tray_near_left_nuts", "nut", (0.145, 0.6, 0.0)),
+    ("tray_left", "screw", (0.27, 0.86, np.pi / 2)),
+    ("tray_left_nuts", "nut", (0.56, 0.81, np.pi / 2)),
+    ("tray_left_far", "screw", (0.85, 0.88, np.pi / 2)),
     ("tray_far", "screw", (1.092, 0.28, np.pi)),
     ("tray_far_nuts", "nut", (1.092, 0.55, np.pi)),
-    ("tray_right", "screw", (0.72, -0.90, -np.pi / 2)),
-    ("tray_right_nuts", "nut", (0.45, -0.90, -np.pi / 2)),
+    ("tray_far_right", "screw", (1.092, -0.35, np.pi)),
+    ("tray_far_right_nuts", "nut", (1.092, -0.6, np.pi)),
+    ("tray_right", "screw", (0.45, -0.90, -np.pi / 2)),
+    ("tray_right_nuts", "nut", (0.72, -0.90, -np.pi / 2)),
 )
-"""Name, kind, and x, y, yaw in the pack frame of trays on the right of who works at each edge [m, rad]."""
+"""Name, kind, and x, y, yaw in the pack frame of trays: both kinds are within reach all round [m, rad]."""
 FRAME = (0.03, 1.20)
 """x at which the widest rectangle is cut in three, so that holes of the long edges split nothing but these [m]."""
 
@@ -76,7 +81,7 @@ class Ioniq5Layout(PackLayout):
         pack = PlanarPose(self.near_edge, self.center_y, self.yaw)
         first = pack.to(PlanarPose(*self.tray_xy, self.tray_yaw))
         side = -1.0 if first.y > 0.0 else 1.0
-        homes = [PlanarPose(x, y * (side if abs(y) < 0.6 else 1.0), yaw) for _, _, (x, y, yaw) in _TRAYS]
+        homes = [PlanarPose(x, y * (side if abs(y) < 0.7 else 1.0), yaw) for _, _, (x, y, yaw) in _TRAYS]
         moved = homes[0].to(first)
         places = [pack @ home @ moved for home in homes]
         return tuple(

@@ -58,11 +58,9 @@ class KitchenLayout:
     """One kitchen, as seen from where the robot should stand: that is the origin, and the robot heads along x.
 
     Attributes:
-        fridge: the fridge.
         counter_top: height of the counter [m].
         counter_front: x of its front edge [m].
         counter_start: where along y it begins, on the far side of the fridge's bar [m].
-        things: what stands on it.
         front, top, steel: colours of cabinets, counter and fridge.
     """
 

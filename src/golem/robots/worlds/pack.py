@@ -20,7 +20,9 @@ from golem.robots.worlds.pack_part import COVER, PackPart, Span, add_hole, add_l
 from golem.robots.worlds.screws import ScrewDraw
 from golem.types import Array, PlanarPose
 
-WALL = 0.003
+WALL, DEEP = 0.003, 0.010
+"""Thickness of a tray's walls and floor, and how far the floor's collider goes on below it [m]: a nut of 2 g that is
+let go 10 cm above falls by as much as the floor in a tick, and would come through."""
 _BOX = mujoco.mjtGeom.mjGEOM_BOX
 
 
@@ -38,7 +40,8 @@ def add_tray(spec: mujoco.MjSpec, layout: PackLayout, place: TrayPlace) -> None:
         ((hx, WALL / 2, hz), (0.0, -hy + WALL / 2, hz)),
     ]
     for k, (size, pos) in enumerate(walls):
-        parts.collider(body, _BOX, size, pos, friction=0.8)
+        (a, b, c), (x, y, z), deep = size, pos, 0.0 if k else 0.5 * DEEP
+        parts.collider(body, _BOX, (a, b, c + deep), (x, y, z - deep), friction=0.8)
         parts.visual(body, _BOX, size, pos, material=paint, name=f"{place.name}_part_{k}")
     rim = 0.006
     for k, (size, pos) in enumerate(

@@ -110,7 +110,6 @@ def add_robocasa(
         spec: the world to extend; only the robot is there.
         config: which kitchen.
         stance: where the robot should stand; the counter's middle is `EDGE` ahead of it.
-        rng: draws the tableware.
 
     Raises:
         ConfigError: see `read_robocasa`; or there is no such counter.

@@ -41,7 +41,7 @@ def add_object(
     loose: bool = True,
     size: float = 1.0,
 ) -> tuple[str, ...]:
-    """Stand an object of `KINDS` somewhere.
+    """Stand an object of `KINDS` somewhere; return the names of the geoms that are seen of it.
 
     Args:
         spec: the world to extend; it has the materials `steel` and `dark`.
@@ -52,9 +52,6 @@ def add_object(
         colour: r, g, b.
         loose: whether it can be moved.
         size: how large it is, as a multiple of what `KINDS` says; its mass stays.
-
-    Returns:
-        The names of the geoms that are seen of it.
     """
     material = f"{name}_coat"
     spec.add_material(name=material, rgba=[*colour, 1.0], specular=0.5, shininess=0.6)

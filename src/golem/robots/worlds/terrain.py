@@ -33,11 +33,7 @@ def add_open(spec: mujoco.MjSpec) -> None:
 
 
 def add_slope(spec: mujoco.MjSpec, angle: float) -> None:
-    """Add a hall with a ramp across the way of a robot that walks ahead: up, a platform, down.
-
-    Args:
-        angle: inclination [rad].
-    """
+    """Add a hall with a ramp of `angle` [rad] across the way of who walks ahead: up, a platform, down."""
     add_open(spec)
     length, level, width = RAMP
     c, s = math.cos(angle), math.sin(angle)
@@ -52,11 +48,7 @@ def add_slope(spec: mujoco.MjSpec, angle: float) -> None:
 
 
 def add_step(spec: mujoco.MjSpec, height: float) -> None:
-    """Add a hall with a platform across the way of a robot that walks ahead: a step up, and one down.
-
-    Args:
-        height: of the platform [m].
-    """
+    """Add a hall with a platform, `height` [m] up, across the way of who walks ahead."""
     add_open(spec)
     length, width = PLATFORM
     body = spec.worldbody.add_body(name="terrain")

@@ -39,7 +39,6 @@ class Task:
     """Something a person is asked to do.
 
     Attributes:
-        act: what.
         text: how, in one sentence.
         joint: index of the joint that is to be moved; -1 for other acts.
         positive: whether in its positive direction.
@@ -73,7 +72,6 @@ class StepFinding:
 
     Attributes:
         passed: whether the bring-up may go on.
-        text: what was found, in one line.
         figures: what was measured, by name with unit.
     """
 
@@ -115,15 +113,7 @@ class BringupConfig:
 
 @dataclass
 class Workbench:
-    """What the checks work with.
-
-    Attributes:
-        link: to the robot.
-        person: beside it.
-        config: options.
-        start_gate: starts the safety gate.
-        gate: it, once it was started.
-    """
+    """What the checks work with; `gate` is there once it was started."""
 
     link: RobotLink
     person: BringupPerson
@@ -132,11 +122,7 @@ class Workbench:
     gate: Process | None = None
 
     def need_gate(self) -> None:
-        """Start the gate unless it runs.
-
-        Raises:
-            StepRefused: it has ended.
-        """
+        """Start the gate unless it runs. Raises StepRefused: it has ended."""
         if self.gate is None:
             self.gate = self.start_gate()
         if self.gate.code is not None:
@@ -149,8 +135,6 @@ class BringupStep:
 
     Attributes:
         name: one word, in the report and the file of what has passed.
-        title: for a person.
-        run: does it.
         lasting: whether it holds beyond this session, so that it is not repeated.
     """
 

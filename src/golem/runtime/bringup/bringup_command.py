@@ -17,16 +17,7 @@ from golem.output_file import write_file
 from golem.robots.model.pinocchio_model import Kinematics
 from golem.robots.model.spatial import skew
 from golem.robots.model.table import JOINT_NAMES, JOINTS
-from golem.runtime.bringup.base import (
-    Act,
-    BringupConfig,
-    BringupPerson,
-    BringupStep,
-    StepFinding,
-    StepRefused,
-    Task,
-    Workbench,
-)
+from golem.runtime.bringup import base
 from golem.runtime.bringup.listening_checks import check_domain, check_sensors, check_state
 from golem.runtime.bringup.motor_checks import check_estop, check_hoist, check_motion, check_release
 from golem.runtime.bringup.robot_link import RobotLink
@@ -42,7 +33,7 @@ class Entry:
     """What was found, and when (ISO 8601, local time)."""
 
     at: str
-    finding: StepFinding
+    finding: base.StepFinding
 
 
 class BringupReport:
@@ -63,7 +54,7 @@ class BringupReport:
             known: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
             old = str(known["where"])
             self._entries = {
-                name: Entry(row["at"], StepFinding(row["passed"], row["text"], row["figures"]))
+                name: Entry(row["at"], base.StepFinding(row["passed"], row["text"], row["figures"]))
                 for name, row in known["checks"].items()
             }
         except (ValueError, KeyError, TypeError, AttributeError) as error:
@@ -75,12 +66,8 @@ class BringupReport:
         """Return whether a check has passed before."""
         return name in self._entries and self._entries[name].finding.passed
 
-    def add(self, name: str, finding: StepFinding) -> None:
-        """Keep what a check found.
-
-        Raises:
-            OutputError: the folder cannot be written to.
-        """
+    def add(self, name: str, finding: base.StepFinding) -> None:
+        """Keep what a check found. Raises OutputError: the folder cannot be written to."""
         self._entries[name] = Entry(datetime.now().astimezone().isoformat(timespec="seconds"), finding)
         rows = {
             name: {"at": e.at, "passed": e.finding.passed, "text": e.finding.text, "figures": e.finding.figures}
@@ -88,12 +75,8 @@ class BringupReport:
         }
         write_file(self._folder / FILE, json.dumps({"where": self._where, "checks": rows}, indent=1) + "\n")
 
-    def page(self, checks: Sequence[BringupStep]) -> Path:
-        """Write the report of all checks; return its path.
-
-        Raises:
-            OutputError: it cannot be written.
-        """
+    def page(self, checks: Sequence[base.BringupStep]) -> Path:
+        """Write the report of all checks; return its path. Raises OutputError: it cannot be written."""
         lines = [f"# Bring-up of the robot on {self._where}", "", f"By GOLEM {__version__}.", ""]
         for check in checks:
             entry = self._entries.get(check.name)
@@ -169,13 +152,7 @@ ALONE = 2.0
 
 @dataclass(frozen=True, slots=True)
 class HandMove:
-    """A joint that was moved.
-
-    Attributes:
-        joint: its index.
-        angle: by how much its position changed [rad].
-        integral: by how much its speed says that it did [rad].
-    """
+    """A joint that was moved by `angle`, and by `integral` of its speed [rad]."""
 
     joint: int
     angle: float
@@ -222,19 +199,19 @@ def wrong_with(move: HandMove, wanted: int, positive: bool, names: Sequence[str]
     return ""
 
 
-def check_joints(bench: Workbench) -> StepFinding:
+def check_joints(bench: base.Workbench) -> base.StepFinding:
     """Each joint, moved by hand, is the one that reports it, with the right sign."""
     bench.person.tell("The robot hangs in its own damping mode. Move one joint at a time, by about 0.2 rad.")
     angles: dict[str, float | str] = {}
     for joint, name in enumerate(JOINT_NAMES):
         wrong, angle = _move(bench, joint)
         if wrong:
-            return StepFinding(False, wrong, angles)
+            return base.StepFinding(False, wrong, angles)
         angles[name] = round(angle, 3)
-    return StepFinding(True, f"{len(angles)} joints report what was done to them", angles)
+    return base.StepFinding(True, f"{len(angles)} joints report what was done to them", angles)
 
 
-def _move(bench: Workbench, joint: int) -> tuple[str, float]:
+def _move(bench: base.Workbench, joint: int) -> tuple[str, float]:
     """Have one joint moved; return what is wrong, empty if nothing is, and how far it moved [rad]."""
     link, person, name = bench.link, bench.person, JOINT_NAMES[joint]
     link.spin(bench.config.patience, link.calm)
@@ -252,23 +229,23 @@ def _move(bench: Workbench, joint: int) -> tuple[str, float]:
         move = hand_move([s for _, s in link.states], before.q)
         return move is not None
 
-    person.act(Task(Act.MOVE, f"Move {name}, so that {words}.", joint, positive))
+    person.act(base.Task(base.Act.MOVE, f"Move {name}, so that {words}.", joint, positive))
     link.spin(bench.config.patience, seen)
-    person.act(Task(Act.LET_GO, "Let go.", joint))
+    person.act(base.Task(base.Act.LET_GO, "Let go.", joint))
     if move is None:
         return f"{name} was to be moved, and no joint reports that it alone was", 0.0
     return wrong_with(move, joint, positive, JOINT_NAMES), move.angle
 
 
-CHECKS: tuple[BringupStep, ...] = (
-    BringupStep("domain", "The robot alone on its domain", check_domain),
-    BringupStep("hoist", "Hung up", check_hoist),
-    BringupStep("state", "What it reports", check_state),
-    BringupStep("joints", "Joint order and signs, by hand", check_joints, lasting=True),
-    BringupStep("estop", "The emergency stop, pressed", check_estop),
-    BringupStep("release", "Its own controllers let go", check_release),
-    BringupStep("motion", "First motion, with low gains", check_motion, lasting=True),
-    BringupStep("sensors", "Cameras, LiDAR, hands", check_sensors, lasting=True),
+CHECKS: tuple[base.BringupStep, ...] = (
+    base.BringupStep("domain", "The robot alone on its domain", check_domain),
+    base.BringupStep("hoist", "Hung up", check_hoist),
+    base.BringupStep("state", "What it reports", check_state),
+    base.BringupStep("joints", "Joint order and signs, by hand", check_joints, lasting=True),
+    base.BringupStep("estop", "The emergency stop, pressed", check_estop),
+    base.BringupStep("release", "Its own controllers let go", check_release),
+    base.BringupStep("motion", "First motion, with low gains", check_motion, lasting=True),
+    base.BringupStep("sensors", "Cameras, LiDAR, hands", check_sensors, lasting=True),
 )
 """In this order; each needs those before it."""
 
@@ -287,12 +264,12 @@ class Terminal:
         except EOFError:
             return False
 
-    def act(self, task: Task) -> None:
+    def act(self, task: base.Task) -> None:
         """Print what is to be done."""
         log_line(f"  -> {task.text}")
 
 
-def run_bringup(config: BringupConfig, person: BringupPerson | None = None) -> bool:
+def run_bringup(config: base.BringupConfig, person: base.BringupPerson | None = None) -> bool:
     """Do what has not passed yet; return whether everything has by the end.
 
     Raises:
@@ -310,7 +287,7 @@ def run_bringup(config: BringupConfig, person: BringupPerson | None = None) -> b
     words = ["safety", *stops, *config.estop.words(), *config.dds.words()]
     with member("bringup", config.dds) as (participant, node):
         link = RobotLink(participant, node, config.dds)
-        bench = Workbench(link, person, config, lambda: Process("safety", words))
+        bench = base.Workbench(link, person, config, lambda: Process("safety", words))
         try:
             done = run_checks(bench, report, CHECKS, config.again)
         finally:
@@ -321,7 +298,7 @@ def run_bringup(config: BringupConfig, person: BringupPerson | None = None) -> b
 
 
 def run_checks(
-    bench: Workbench, report: BringupReport, checks: tuple[BringupStep, ...], again: Collection[str]
+    bench: base.Workbench, report: BringupReport, checks: tuple[base.BringupStep, ...], again: Collection[str]
 ) -> bool:
     """Do the checks in order, those left out that last and have passed; return whether none failed."""
     tell = bench.person.tell
@@ -333,8 +310,8 @@ def run_checks(
         tell(f"{head} ...")
         try:
             finding = check.run(bench)
-        except StepRefused as refusal:
-            finding = StepFinding(False, str(refusal))
+        except base.StepRefused as refusal:
+            finding = base.StepFinding(False, str(refusal))
         report.add(check.name, finding)
         tell(f"{head}: {'passed' if finding.passed else 'FAILED'}: {finding.text}.")
         if not finding.passed:

@@ -142,12 +142,7 @@ SEEN = 0.05
 
 
 class DeviceEars:
-    """What has come from one device.
-
-    Attributes:
-        stamps: of its messages [s].
-        faults: what is wrong with what they say.
-    """
+    """What has come from one device: `stamps` of its messages [s], and `faults` of what they say."""
 
     def __init__(self, bench: Workbench, topic: str, check: Callable[[Any], str]) -> None:
         """Listen to `topic`; `check` returns what is wrong with a message, empty if nothing is."""

@@ -47,7 +47,6 @@ class RobotLink:
     """A robot on a domain, seen by one who only listens until told otherwise.
 
     Attributes:
-        node: the one that listens.
         states: the newest ones, oldest first, each with the time by our clock at which it came [s].
         damaged: states that could not be read.
         gate: newest verdict of the safety gate; None before the first.

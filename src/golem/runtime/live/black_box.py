@@ -38,11 +38,7 @@ def beside(write: Callable[[], None]) -> None:
 
 
 class BlackBox:
-    """Keeps the frames of the last seconds, and writes them once a stop is long enough ago.
-
-    Attributes:
-        written: folders of the bags so far.
-    """
+    """Keeps the frames of the last seconds, and writes a folder once a stop is long enough ago; see `written`."""
 
     def __init__(self, folder: Path, tell: Callable[[str], None], run: Write = beside) -> None:
         """Write bags into `folder`, and `tell` where each is; `run` runs what writes one."""

@@ -23,11 +23,7 @@ QUIET = 5.0
 
 
 class RejectedMessages:
-    """Messages of one kind that were refused; the first is said at once.
-
-    Attributes:
-        why: the reason of the last one.
-    """
+    """Messages of one kind that were refused, the last one for `why`; the first is said at once."""
 
     def __init__(self, what: str, tell: Callable[[str], None], clock: Callable[[], float] = time.monotonic) -> None:
         """Call a message `what`; `tell` a person, without being held up, on this process's own `clock` [s]."""
@@ -59,11 +55,7 @@ class StreamOut:
     def __init__(
         self, bus: Bus, endpoints: RoleEndpoints, row: TopicRow, encode: Callable[[Any], Any] | None = None
     ) -> None:
-        """Send what is on `bus`, as `row` says or as `encode` says.
-
-        Raises:
-            ValueError: the row is of no stream, or is thinned to no rate.
-        """
+        """Send what is on `bus`, as `row` or `encode` says. Raises ValueError: the row has no stream, or no rate."""
         if row.key is None or (row.thinned and row.rate is None):
             raise ValueError(f"the table does not say what to send on {row.name}, or how often")
         self.period = 1.0 / row.rate if row.thinned and row.rate is not None else TICK
@@ -78,11 +70,7 @@ class StreamOut:
 
 
 class StreamIn:
-    """Brings the values of one topic to the bus.
-
-    Attributes:
-        refused: messages that are none.
-    """
+    """Brings the values of one topic to the bus; `refused` are messages that are none."""
 
     def __init__(
         self,

@@ -58,7 +58,6 @@ class Broadcast:
         self._follower = Executor(Bus(), _nodes(running.bus, robot, domain))
 
     def __call__(self) -> None:
-        """Show what the tick brought that has just passed."""
         if self._executor.t < TICK:
             return  # none has
         t = self._time()

@@ -20,8 +20,7 @@ AGREEMENT = (0.9, 1.1)
 
 def time_since_boot() -> float:
     """Return a monotonic time that goes on while the machine sleeps, where the system has one [s]."""
-    clock = getattr(time, "CLOCK_BOOTTIME", time.CLOCK_MONOTONIC)
-    return time.clock_gettime(clock)
+    return time.clock_gettime(getattr(time, "CLOCK_BOOTTIME", time.CLOCK_MONOTONIC))
 
 
 class Rate:

@@ -125,12 +125,7 @@ class DeviceProcess(ABC):
         clock: Callable[[], float],
         tell: Callable[[str], None],
     ) -> None:
-        """Publish `topics`, which are the robot's.
-
-        Args:
-            clock: this process's own [s], in which the driver stamps.
-            tell: says a line to a person.
-        """
+        """Publish `topics` of the robot; the driver stamps by `clock` [s], and `tell` says a line to a person."""
         self.clock, self.tell = clock, tell
         self.endpoints = RoleEndpoints("robot", participant, node, topics)
         self._robot_time = RobotTime(node, clock)
@@ -207,7 +202,6 @@ class LidarProcess(DeviceProcess):
         self._reports, self._lost = Every(REPORT), (0, 0)
 
     def measured(self, now: float) -> Iterable[Measurement]:
-        """Return points and IMU; see `DeviceProcess`."""
         for value in self._lidar.step(now):
             if isinstance(value, LidarScan):
                 self._heard = now
@@ -259,7 +253,6 @@ class CameraProcess(DeviceProcess):
         super().__init__(participant, node, self._topics, clock, tell)
 
     def measured(self, now: float) -> Iterable[Measurement]:
-        """Return a new exposure; see `DeviceProcess`."""
         exposure = self._source.step()
         self.fault(f"{self._name} camera", self._source.fault)
         return [] if exposure is None else [Measurement(topic, exposure) for topic in self._topics]
@@ -286,12 +279,7 @@ def run_hands(config: HandsConfig) -> None:
 
 
 def run_lidar(config: LidarConfig) -> None:
-    """Publish until Ctrl-C.
-
-    Raises:
-        LidarError: a port cannot be opened.
-        DdsError: the domain cannot be joined.
-    """
+    """Publish until Ctrl-C. Raises LidarError: a port cannot be opened; DdsError: the domain cannot be joined."""
     with closing(Mid360(config.host, config.device, config.point_port, config.imu_port)) as lidar:
         words = f"The LiDAR that sends to {config.host} is on {config.dds}. Ctrl-C ends its driver."
         _drive("lidar", config.dds, words, partial(LidarProcess, lidar=lidar))

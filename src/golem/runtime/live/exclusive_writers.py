@@ -57,11 +57,7 @@ def refuse_second(participant: CycloneParticipant, dds: DdsConfig, *topics: str)
 
 
 def refuse_second_launch(participant: CycloneParticipant, dds: DdsConfig) -> None:
-    """Take `DISCOVERY` to look whether a robot, its gate or its stack is on the domain, or is about to be.
-
-    Raises:
-        ConfigError: one is.
-    """
+    """Look, for `DISCOVERY`, whether a robot, its gate or its stack is on the domain. Raises ConfigError: one is."""
     time.sleep(DISCOVERY)
     first = launcher(participant)
     if first:

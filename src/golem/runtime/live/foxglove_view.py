@@ -39,12 +39,7 @@ class ViewConfig:
 
 
 def run_view(config: ViewConfig) -> None:
-    """Serve until Ctrl-C.
-
-    Raises:
-        ConfigError: an option is wrong, or the port is taken.
-        DdsError: the domain cannot be joined.
-    """
+    """Serve until Ctrl-C. Raises ConfigError: an option is wrong, or the port taken; DdsError: no domain."""
     topics = public_topics(config.topics)
     for name in config.topics:
         if name not in {topic.name for topic in topics}:

@@ -17,6 +17,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -72,13 +73,11 @@ class Damper:
         row = public.topic("/lowcmd")
         writer = self._participant.writer(names.topic(row.name), dds_name(row.type), row.qos)
         payload = encode_low_command(passive(0.0, None, self._limits.damping), MODE_MACHINE)
-        try:
+        with closing(writer):
             for _ in range(round(self._limits.damping_time / TICK)):
                 writer.write(payload)
                 if wait(TICK):
                     return
-        finally:
-            writer.close()
 
 
 Part = Literal["twin", "safety", "up"]
@@ -102,11 +101,7 @@ class LaunchConfig(TwinConfig):
 
 
 def commands(config: LaunchConfig) -> dict[Part, list[str]]:
-    """Return the words after `golem` that start each process.
-
-    Raises:
-        ConfigError: the stack file is wrong, or the real robot is meant.
-    """
+    """Return the words after `golem` for each process. Raises ConfigError: a wrong stack file, or the real robot."""
     if config.dds.robot:
         raise ConfigError(
             "golem launch starts a simulation. On the real robot start, each in a terminal of its own: "
@@ -189,11 +184,7 @@ class Process:
 
 
 class Launcher:
-    """The processes of one robot.
-
-    Attributes:
-        gate: newest verdict of the safety gate; None before the first.
-    """
+    """The processes of one robot; `gate` is the newest verdict of the safety gate, None before the first."""
 
     def __init__(self, words: dict[Part, list[str]], node: RosNode, activate: bool, damper: Damper) -> None:
         """Start the processes, `words` being their command lines; watch the gate through `node`.

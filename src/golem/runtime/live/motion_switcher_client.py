@@ -22,11 +22,7 @@ SILENCE = 2.0
 
 
 class MotionSwitcherClient:
-    """Asks the robot's motion switcher, again and again, which of its own controllers has the motors.
-
-    Attributes:
-        owner: the controller that has them by the newest answer; empty if none has.
-    """
+    """Asks the motion switcher, again and again, which controller, the `owner`, has the motors; empty if none has."""
 
     def __init__(self, client: RpcClient, clock: Callable[[], float]) -> None:
         """Ask through `client`, by `clock` [s]."""

@@ -68,8 +68,7 @@ class Nav2Bridge:
                 self._active = None
 
     def _send(self, goal: Nav2Goal) -> None:
-        stamp = convert.header(self._now(), self._frame)
-        pose = geometry_msgs.PoseStamped(stamp, convert.pose(goal.pose.matrix()))
+        pose = geometry_msgs.PoseStamped(convert.header(self._now(), self._frame), convert.pose(goal.pose.matrix()))
         self._answer = self._client.send_goal(codec.action(TYPE).Goal(pose, ""))
         self._answer.then(lambda answer: self._answered(goal.number, answer))
 

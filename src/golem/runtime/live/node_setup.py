@@ -65,11 +65,7 @@ def until(node: RosNode, condition: Callable[[], bool], timeout: float) -> bool:
 
 
 def find(node: RosNode, name: str, client: Client | ActionClient, remedy: str) -> None:
-    """Wait until somebody offers what `client` asks for.
-
-    Raises:
-        RosError: nobody offers `name`; `remedy` says what the user can do.
-    """
+    """Wait until somebody offers what `client` asks for. Raises RosError: nobody does; `remedy` says what to do."""
     if not until(node, client.ready, SEARCH):
         raise RosError(f"Nobody offers '{name}'; {remedy}.")
 
@@ -94,7 +90,6 @@ class AsyncLogger:
         self._thread.start()
 
     def __call__(self, text: str) -> None:
-        """Have a line said."""
         self._lines.put(text)
 
     def close(self) -> None:

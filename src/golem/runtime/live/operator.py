@@ -84,11 +84,7 @@ def run_request(what: str, config: RequestConfig) -> bool:
 
 
 def run_restart(config: RestartConfig) -> bool:
-    """Have a process restarted, and say what is answered; return whether it was.
-
-    Raises:
-        RosError: nothing here was launched.
-    """
+    """Have a process restarted, say the answer; return whether it was. Raises RosError: nothing was launched."""
     with member("operator", config.dds) as (_, node):
         name = f"/launch/restart_{config.process}"
         remedy = f"only what 'golem launch' started on {config.dds} can be restarted so"
@@ -170,11 +166,7 @@ HELP = (
 
 
 def run_console(config: RequestConfig) -> None:
-    """Wait for lines on the standard input, and ask the safety process on a domain for what each says.
-
-    Raises:
-        RosError: there is none.
-    """
+    """Wait for lines on stdin, and ask the safety process for what each says. Raises RosError: there is none."""
     with member("operator", config.dds) as (_, node):
         console = Console(node, lambda answer: node.wait(answer, ANSWER))
         console.connect(f"start it with: {config.dds.command('safety')}")
@@ -196,11 +188,7 @@ class Console:
         self._node, self._wait, self._tell = node, wait, tell
 
     def connect(self, remedy: str) -> None:
-        """Find every service, so that no call has to look for it.
-
-        Raises:
-            RosError: nobody offers them; `remedy` says what to do.
-        """
+        """Find every service ahead of the first call. Raises RosError: nobody offers them; `remedy` says what to do."""
         for name, client in self._clients.items():
             find(self._node, name, client, remedy)
 

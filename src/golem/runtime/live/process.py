@@ -75,11 +75,7 @@ class UpConfig:
 
 
 def twin_stack(config: TwinConfig) -> Stack:
-    """Return the stack whose robot the twin is.
-
-    Raises:
-        ConfigError: the stack file is wrong.
-    """
+    """Return the stack whose robot the twin is. Raises ConfigError: the stack file is wrong."""
     stack = load_stack(config.stack, profile=config.profile)
     if config.world is not None:
         stack = stack.with_options("robot", world=config.world)

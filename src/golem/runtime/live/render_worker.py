@@ -48,12 +48,7 @@ class RenderWorker:
     period = TICK
 
     def __init__(self, stack: Stack, seed: int, robot: Restorable, dds: DdsConfig) -> None:
-        """Start the process.
-
-        Args:
-            stack: what `robot` was built from.
-            dds: where the images go.
-        """
+        """Start the process, for the robot of `stack`; its images go to the domain of `dds`."""
         self._robot = robot
         self._periods = {name: 1.0 / info.rate for name, info in robot.cameras.items()}
         self._due = dict.fromkeys(self._periods, 0.0)
@@ -67,11 +62,7 @@ class RenderWorker:
         self._free, self._deadline = False, math.inf
 
     def step(self, t: float) -> None:
-        """Hand over what is due.
-
-        Raises:
-            GolemError: the process has died.
-        """
+        """Hand over what is due. Raises GolemError: the process has died."""
         for name, due in self._due.items():
             if t >= due - 1e-9:
                 self._due[name] = due + self._periods[name]

@@ -22,11 +22,7 @@ from golem.types import TICK
 
 
 class RoleEndpoints:
-    """The endpoints of one role; as a node of an executor it handles what has arrived, once per tick.
-
-    Attributes:
-        rows: what it publishes.
-    """
+    """The endpoints of one role's `rows`; as a node of an executor it handles what has arrived, once per tick."""
 
     period = TICK
 
@@ -66,11 +62,7 @@ class RoleEndpoints:
             self._publishers[topic].publish(message)
 
     def send(self, topic: str, value: Any, encode: Callable[[Any], Any] | None = None) -> None:
-        """Send a value as the table says, or as `encode` says, unless that is made on demand and nobody listens.
-
-        Raises:
-            ValueError: neither says how.
-        """
+        """Send a value by table or `encode`, unless on demand and unheard. Raises ValueError: neither says how."""
         row = self.rows[topic]
         encode = encode or row.encode
         if encode is None:

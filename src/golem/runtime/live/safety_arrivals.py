@@ -26,11 +26,7 @@ REMEMBERED = 256
 
 
 class DamagedFrames:
-    """Counts damaged frames of one stream: one is dropped, a run of them is a fault.
-
-    Attributes:
-        dropped: how many there were.
-    """
+    """Counts damaged frames of one stream: one is dropped, a run of them is a fault."""
 
     def __init__(self, limits: SafetyLimits) -> None:
         self._most, self._leak, self._level = limits.bad_frames, limits.frame_leak, 0.0

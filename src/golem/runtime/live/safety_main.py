@@ -64,11 +64,7 @@ def unknown_senders(participant: CycloneParticipant) -> list[str]:
 
 
 class SenderWatch:
-    """Looks for unknown senders on a thread of its own: a look takes longer than the gate has.
-
-    Attributes:
-        found: what the newest look found.
-    """
+    """Looks for unknown senders on a thread of its own: a look takes longer than the gate has."""
 
     def __init__(self, participant: CycloneParticipant) -> None:
         self.found: tuple[str, ...] = ()

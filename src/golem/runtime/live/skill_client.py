@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import threading
 from collections.abc import Mapping
+from contextlib import closing
 from dataclasses import dataclass, field, fields
 from typing import Any
 
@@ -111,30 +112,19 @@ def local_skills(config: SkillClientConfig, words: list[str]) -> Specs | None:
 
 
 def ask_skills(node: RosNode, remedy: str) -> Specs:
-    """Return the skills of the stack on the domain.
-
-    Raises:
-        RosError: no stack is there; `remedy` says what to do.
-        GolemError: what it says of them cannot be read.
-    """
+    """Return the skills of the stack on the domain. Raises RosError: none is there; GolemError: they cannot be read."""
     row = public.topic("/skill/list")
     listed = node.subscription(row.name, row.type, None, row.qos)
-    try:
+    with closing(listed):
         until(node, lambda: listed.latest() is not None, SEARCH)
         message = listed.latest()
         if message is None:
             raise RosError("; ".join(filter(None, ("No stack tells its skills", remedy))) + ".")
         return read_list(message)
-    finally:
-        listed.close()
 
 
 def choose(specs: Specs, name: str) -> SkillSpec:
-    """Return the skill called `name`, or whose implementation `name` is: `my_skill.py:Mine`.
-
-    Raises:
-        ConfigError: there is none.
-    """
+    """Return the skill called `name`, or implemented by it: `my_skill.py:Mine`. Raises ConfigError: there is none."""
     by_use = [spec for spec in specs.values() if ":" in name and _file(spec.use) == _file(name)]
     if name not in specs and len(by_use) != 1:
         raise unknown_name("skill", name, specs)

@@ -137,11 +137,7 @@ def list_message(specs: Iterable[SkillSpec]) -> golem_interfaces.SkillList:
 
 
 def read_list(message: golem_interfaces.SkillList) -> dict[str, SkillSpec]:
-    """Return the skills that a stack offers, by name.
-
-    Raises:
-        GolemError: a goal is described by what is no JSON.
-    """
+    """Return the skills that a stack offers, by name. Raises GolemError: a goal is described by what is no JSON."""
     try:
         specs = [SkillSpec(s.name, s.use, s.summary, json.loads(s.goal), json.loads(s.result)) for s in message.skills]
     except ValueError as error:

@@ -28,7 +28,6 @@ from golem.middleware.wire.struct_layout import WireError
 from golem.robots.sensors.calibration import calibrations
 from golem.runtime.executor import Executor, Phase, Placed, in_order
 from golem.runtime.live import stack_streams as out
-from golem.runtime.live.arm_sdk import ArmSdk
 from golem.runtime.live.bridge import RejectedMessages, incoming, outgoing
 from golem.runtime.live.clock import RobotClock
 from golem.runtime.live.nav2_bridge import Nav2Bridge
@@ -39,7 +38,7 @@ from golem.runtime.live.role_endpoints import RoleEndpoints
 from golem.runtime.live.sim_sync import CATCH_UP, SILENCE
 from golem.runtime.live.skill_action_server import SkillActionServer
 from golem.runtime.live.skill_messages import list_message
-from golem.runtime.live.stack_streams import CameraIn, GateIn, OnePerTick, RemoteGantry
+from golem.runtime.live.stack_streams import ArmSdk, CameraIn, GateIn, OnePerTick, RemoteGantry
 from golem.runtime.node_groups import StackNodes, hears_lidar
 from golem.runtime.nodes import moving
 from golem.runtime.onboard_nodes import stack_loco_api

@@ -17,7 +17,8 @@ from golem.interfaces import ros_convert as convert
 from golem.interfaces.images import Lens, Pairing, to_lens
 from golem.interfaces.payloads import Exposure, GateState, GateStatus, HandGoal
 from golem.interfaces.ros_convert import MAP_FRAME
-from golem.middleware.bus import Bus, Topic
+from golem.interfaces.unitree_api import ArmSdkCommand
+from golem.middleware.bus import Bus, News, Topic
 from golem.middleware.ros.future import Future
 from golem.middleware.ros.msgs import golem_interfaces, sensor_msgs
 from golem.middleware.ros.msgs.geometry_msgs import WrenchStamped
@@ -32,14 +33,63 @@ from golem.middleware.wire.convert import encode_low_command
 from golem.robots.model import magpie_model
 from golem.robots.model.imu_mount import sensed_base_rate
 from golem.robots.sensors.cameras import CAMERAS
-from golem.runtime.live.arm_sdk import ArmSdk
 from golem.runtime.live.bridge import Encoders
 from golem.runtime.live.node_setup import log_line
 from golem.runtime.live.role_endpoints import RoleEndpoints
 from golem.runtime.live.sim_sync import SILENCE
 from golem.runtime.nodes import moving
 from golem.runtime.perception_nodes import detection_requested
-from golem.types import SIDES, TICK, UPPER, Array, BaseEstimate, LowCommand, LowState, Side
+from golem.types import ARMS, SIDES, TICK, UPPER, Array, BaseEstimate, LowCommand, LowState, Side
+
+RATE = 0.5
+"""How fast the weight follows what is asked for [1/s], as xr_teleoperate lets go: 4 rad go by 4 mrad a tick."""
+SILENT = 0.25
+"""Time without a command after which the arms go back [s] [own: the examples send one each 20 ms]."""
+LET_GO = 1.0
+"""Time without a command after which whoever held the arms while they were not to be had has let go [s]."""
+NOTHING = 1e-3
+"""Weight that asks for nothing."""
+
+
+class ArmSdk:
+    """Blends what a program wants of the arms into the motors' command, by its `weight` of 0 to 1."""
+
+    def __init__(self, bus: Bus, closed: Callable[[], bool], tell: Callable[[str], None] = lambda text: None) -> None:
+        """Take commands from `bus` unless `closed()`; `tell` says a line to a person."""
+        self._news, self._closed, self._tell = News(bus, topics.ARM_SDK), closed, tell
+        self._newest: ArmSdkCommand | None = None
+        self._heard = self._t = 0.0
+        self._held = False
+        self.weight = 0.0
+
+    def blend(self, command: LowCommand, t: float) -> LowCommand:
+        """Return `command` with the arms as far the program's as it asks for, at robot time `t` [s]."""
+        came, dt = self._news.read(), t - self._t
+        self._t = t
+        if dt < 0.0:  # the robot was restarted
+            self._newest, self.weight, dt = None, 0.0, 0.0
+        if came is not None:
+            self._newest, self._heard = came, t
+        silent = t - self._heard
+        wanted = 0.0 if self._newest is None or silent > SILENT else self._newest.weight
+        if self._closed():
+            self._held, wanted = self._held or wanted > NOTHING, 0.0
+        elif wanted <= NOTHING and (silent > LET_GO or (silent <= SILENT and self._newest is not None)):
+            self._held = False
+        before, step = self.weight, RATE * min(dt, TICK)
+        wanted = 0.0 if self._held else wanted
+        self.weight = min(max(wanted, before - step), before + step)
+        if self._newest is None or self.weight <= 0.0:
+            return command
+        if before <= 0.0:
+            self._tell("A program of the vendor's has the arms, by /arm_sdk; the legs go on.")
+        w, fields = self.weight, {}
+        for k, name in enumerate(("q", "dq", "tau", "kp", "kd")):
+            values = getattr(command, name).copy()
+            values[ARMS] = (1.0 - w) * values[ARMS] + w * self._newest.motors[k]
+            fields[name] = values
+        return replace(command, **fields)
+
 
 T = TypeVar("T")
 
@@ -155,11 +205,7 @@ class GateIn:
 
 
 class RemoteGantry:
-    """The band of a twin that stands, let go by a call; see `HasGantry`.
-
-    Attributes:
-        on_gantry: whether it is still to be let go, as far as is known.
-    """
+    """The band of a twin that stands, let go by a call, as far as is known; see `HasGantry`."""
 
     def __init__(self, node: RosNode) -> None:
         self._client: Client = node.client("/elastic_band/release", public.TRIGGER)
@@ -252,12 +298,7 @@ def _touched(sense: ContactSense, force: HandForce, side: Side, state: LowState)
 
 
 def hand_services(bus: Bus, side: Side, now: Callable[[], float]) -> dict[str, Callable[[Any], Any]]:
-    """Return what answers the services of one hand.
-
-    Args:
-        bus: where its controller takes goals from.
-        now: robot time [s].
-    """
+    """Return what answers the services of one hand, whose controller reads `bus`; `now` is robot time [s]."""
 
     def give(goal: HandGoal) -> tuple[bool, str]:
         if not moving(bus):

@@ -54,12 +54,7 @@ class Row:
 
 
 def run_topic_stats(config: TopicStatsConfig) -> None:
-    """Listen, and print a table.
-
-    Raises:
-        ConfigError: an option is wrong.
-        DdsError: the domain cannot be joined.
-    """
+    """Listen, and print a table. Raises ConfigError: an option is wrong; DdsError: the domain cannot be joined."""
     if not 0.0 < config.seconds < 3600.0:
         raise ConfigError(f"Listening takes a positive time in seconds, not {config.seconds:g}.")
     with member("topics", config.dds) as (participant, _):

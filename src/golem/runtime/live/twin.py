@@ -112,11 +112,7 @@ FOREVER = 1e9
 
 
 class Twin:
-    """A robot on the domain.
-
-    Attributes:
-        commands: what takes the motors' command.
-    """
+    """A robot on the domain; `commands` takes the motors' command."""
 
     def __init__(
         self,
@@ -162,8 +158,7 @@ class Twin:
         if stack.legs_on_board is None:
             placed.append((Phase.SERVE, UnansweredCalls(bus, stack_loco_api(stack), tell)))
         else:
-            estimator = nodes.EstimatorNode(bus, *ModuleFactory(stack).make("estimator"))
-            placed.append((Phase.ESTIMATE, estimator))
+            placed.append((Phase.ESTIMATE, nodes.EstimatorNode(bus, *ModuleFactory(stack).make("estimator"))))
         incoming(bus, endpoints, lambda: self.executor.t, tell)
         endpoints.serve({"/elastic_band/release": self._release})
         describe(endpoints, robot.calibration)

@@ -33,7 +33,6 @@ class Images:
     """Images of any size on a device, padded to the largest."""
 
     def __init__(self, images: Sequence[NDArray[np.uint8]], device: str) -> None:
-        """Copy them there, as bytes."""
         height, width = (max(image.shape[side] for image in images) for side in (0, 1))
         self.sizes = np.array([image.shape[1::-1] for image in images], float)
         self.pixels = torch.zeros((len(images), 3, height, width), dtype=torch.uint8, device=device)
@@ -74,15 +73,12 @@ class Images:
 
 
 def place_crop(labels: Array, size: Array, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Draw a zoomed and mirrored piece of an image, usually around a part.
+    """Draw a zoomed and mirrored piece of an image, usually around a part: scale, shift, (2,) each; see `Images.cut`.
 
     Args:
         labels: (n, 8) of the image, columns as in `labels.COLUMNS`.
         size: (2,) width and height of the image [px].
         rng: draws it.
-
-    Returns:
-        scale, shift: (2,) each along x and y; see `Images.cut`.
     """
     half = np.array(CROP) / 2
     zoom = float(np.exp(rng.uniform(*np.log(ZOOM))))
@@ -116,12 +112,7 @@ def moved_labels(labels: Array, size: Array, scale: Array, shift: Array) -> Arra
 
 
 def corrupt(crops: Tensor, rng: torch.Generator) -> Tensor:
-    """Return crops (n, 3, height, width) in 0..1, normalised, with random exposure, colour, blur and noise.
-
-    Args:
-        crops: to be changed.
-        rng: on their device.
-    """
+    """Return crops (n, 3, height, width), 0 to 1, normalised, with random exposure, colour, blur and noise."""
     n, _, height, width = crops.shape
     device = crops.device
 

@@ -263,11 +263,7 @@ def _write(path: Path, seed: int, index: int, split: str, per_camera: int, kind:
 
 
 def load(folder: Path, split: str) -> Dataset:
-    """Read a split.
-
-    Raises:
-        FileNotFoundError: nothing was rendered there.
-    """
+    """Read a split. Raises FileNotFoundError: nothing was rendered there."""
     paths = sorted((folder / split).glob("*.npz"))
     if not paths:
         raise FileNotFoundError(f"no rendered worlds in {folder / split}")

@@ -20,11 +20,7 @@ SIZE = (1000, 420)
 
 
 def draw_curve(curve: Path, out: Path) -> None:
-    """Draw average precision over crops seen, per class, one panel per camera.
-
-    Raises:
-        MissingExtra: matplotlib is not installed.
-    """
+    """Draw average precision over crops seen, per class and camera. Raises MissingExtra: without matplotlib."""
     with curve.open() as file:
         rows = list(csv.DictReader(file))
     seen = [int(row["images"]) / 1000 for row in rows]

@@ -35,7 +35,6 @@ def label_image(scene: RandomScene, info: CameraInfo, segmentation: NDArray[np.i
 
     Args:
         scene: the world at the moment of exposure.
-        info: the camera.
         segmentation: (height, width) geom ids.
     """
     T_optical_world = np.linalg.inv(camera_pose(scene.world, info.name)).astype(np.float64)

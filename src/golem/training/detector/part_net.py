@@ -47,7 +47,6 @@ class PartNet(nn.Module):
     """
 
     def __init__(self, classes: int) -> None:
-        """Build the network with random weights."""
         super().__init__()
         self.stem = _block(3, 16, 2)
         self.down4 = nn.Sequential(_block(16, 24, 2), _block(24, 24))

@@ -67,7 +67,6 @@ class RandomScene(ABC):
     """A compiled random world, and what differs between its images.
 
     Attributes:
-        world: the compiled model.
         parts: what a detector can be asked for.
         bores: of the loose screws.
         screw_tops: how far above its body a loose screw's head ends, by the name of the body [m].
@@ -245,11 +244,9 @@ def aim(info: CameraInfo, target: Array, view: Array, distance: float, rng: np.r
     """Return the (4, 4) pose in the world of a camera that shows `target` at a random pixel.
 
     Args:
-        info: the camera.
         target: (3,) in the world [m].
         view: (3, 3) orientation of the optical frame.
         distance: of the target along the optical axis [m].
-        rng: draws the pixel.
     """
     pixel = rng.uniform([0.1, 0.1], [0.9, 0.9]) * (info.width, info.height)
     ray = np.array([(pixel[0] - info.cx) / info.fx, (pixel[1] - info.cy) / info.fy, 1.0])

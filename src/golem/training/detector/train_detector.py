@@ -189,7 +189,6 @@ class Crops:
     """Random crops of a data set, and what the network should say of them, made on the device that trains."""
 
     def __init__(self, data: dataset.Dataset, classes: int, device: str) -> None:
-        """Copy the images to the device."""
         self._labels, self._classes, self._device = data.labels, classes, device
         self._images = augment.Images(data.images, device)
 
@@ -243,7 +242,6 @@ def train(config: TrainDetectorConfig, stop: int | None = None) -> Path:
     """Train or resume.
 
     Args:
-        config: how.
         stop: leave off at this step (a multiple of `config.check_every`), to be resumed.
 
     Returns:
@@ -267,11 +265,7 @@ def set_apart(data: dataset.Dataset, most: int) -> tuple[dataset.Dataset, datase
 
 
 def fit(config: TrainDetectorConfig, data: dataset.Dataset, stop: int | None = None) -> Path:
-    """Train or resume on images in memory; see `train`.
-
-    Raises:
-        ConfigError: the run that is there is of other classes.
-    """
+    """Train or resume on images in memory; see `train`. Raises ConfigError: a run of other classes is there."""
     torch.set_num_threads(1)
     torch.manual_seed(config.seed)
     config.out.mkdir(parents=True, exist_ok=True)

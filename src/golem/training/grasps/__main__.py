@@ -30,11 +30,7 @@ LINES = {
 
 
 def draw_curve(curve: Path, out: Path) -> None:
-    """Draw the area under the ROC curve over epochs.
-
-    Raises:
-        MissingExtra: matplotlib is not installed.
-    """
+    """Draw the area under the ROC curve over epochs. Raises MissingExtra: matplotlib is not installed."""
     figure = blank_figure(*SIZE)
     with curve.open() as file:
         rows = list(csv.DictReader(file))

@@ -18,12 +18,101 @@ from golem.capabilities.grasping.centroid import grasp_pose
 from golem.capabilities.grasping.hand_view import FACTS, SEEN, hand_view
 from golem.capabilities.grasping.object_cloud import MIN_POINTS, object_points
 from golem.robots.model import magpie_model
+from golem.robots.model.mjcf import add_hand
 from golem.robots.model.spatial import quat_of
 from golem.robots.mujoco.hand_servos import HandServos
+from golem.robots.sensors.cameras import RIGHT_HAND, rays
+from golem.robots.sensors.depth import STEREO
+from golem.robots.sensors.profiles import D400
 from golem.robots.sensors.streams import stream
-from golem.robots.worlds.tableware import KINDS
-from golem.training.grasps import ware_scene
+from golem.robots.worlds import hall, parts
+from golem.robots.worlds.kitchen import GRIP
+from golem.robots.worlds.tableware import COLOURS, KINDS, add_object
 from golem.types import Array, Detection, HandCommand, LocalizedObject
+
+SIDE = "right"
+WARE, WRIST, LEADER = "ware", f"{SIDE}_wrist_yaw_link", "leader"
+WRIST_MASS, WRIST_INERTIA = 1.0, 0.003
+"""What of a forearm moves with the hand [kg], [kg m^2]."""
+STEP = 0.002
+"""Physics step [s], as that of the twin."""
+EVERY = 3
+"""Every so many pixels of the palm camera have a ray."""
+SIZES = (0.8, 1.2)
+"""Range of the wares' size, 1 is that of the kitchen's."""
+
+
+@dataclass(frozen=True, slots=True)
+class WareDraw:
+    """One ware on the table: its kind, size and heading [rad], and the hand's wanted approach (3,)."""
+
+    kind: str
+    size: float
+    yaw: float
+    approach: Array
+
+
+def draw_ware(rng: np.random.Generator) -> WareDraw:
+    """Return a ware of `KINDS`, to be taken from above, or forward with a lean as `take` does."""
+    kind = str(rng.choice(list(KINDS)))
+    size, yaw, heading = float(rng.uniform(*SIZES)), *(float(a) for a in rng.uniform(-np.pi, np.pi, 2))
+    lean = 0.5 * np.pi if rng.random() < 0.65 else 0.5
+    lean += float(rng.normal(0.0, 0.04))
+    flat = np.cos(lean)
+    approach = np.array([flat * np.cos(heading), flat * np.sin(heading), -np.sin(lean)])
+    return WareDraw(kind, size, yaw, approach)
+
+
+def build_world(draw: WareDraw) -> mujoco.MjModel:
+    """Return the compiled world: the table's top is at z = 0, the ware stands on the origin."""
+    spec = mujoco.MjSpec()
+    spec.compiler.degree = False
+    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_NATIVECCD
+    spec.option.impratio, spec.option.cone = GRIP, mujoco.mjtCone.mjCONE_ELLIPTIC
+    spec.option.timestep = STEP
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    hall.add_materials(spec)
+    box, top = mujoco.mjtGeom.mjGEOM_BOX, (0.6, 0.6, 0.02)
+    parts.collider(spec.worldbody, box, top, (0.0, 0.0, -0.02), friction=0.7)
+    parts.visual(spec.worldbody, box, top, (0.0, 0.0, -0.02), material="steel")
+    add_object(spec, draw.kind, WARE, (0.0, 0.0, 0.0), draw.yaw, COLOURS[draw.kind][0], size=draw.size)
+    spec.worldbody.add_body(name=LEADER, mocap=True)
+    wrist = spec.worldbody.add_body(
+        name=WRIST, mass=WRIST_MASS, inertia=[WRIST_INERTIA] * 3, explicitinertial=True, pos=[0.0, 0.0, 1.0],
+        ipos=[0.0, 0.0, 0.0],
+    )  # fmt: skip
+    wrist.add_freejoint(name=WRIST)
+    add_hand(spec, SIDE)
+    for body in [wrist, *wrist.find_all(mujoco.mjtObj.mjOBJ_BODY)]:
+        body.gravcomp = 1.0
+    spec.add_equality(
+        type=mujoco.mjtEq.mjEQ_WELD, objtype=mujoco.mjtObj.mjOBJ_BODY, name1=LEADER, name2=WRIST,
+        data=[0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 1, 0],
+    )  # fmt: skip
+    return spec.compile()
+
+
+def palm_cloud(
+    model: mujoco.MjModel, data: mujoco.MjData, T: Array, rng: np.random.Generator
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Return what a palm camera at `T` (4, 4) shows: (n, 3) points [m], and (n,) whether they are the ware's.
+
+    Depth has the noise of the profile `field`.
+    """
+    grid = rays(RIGHT_HAND)[::EVERY, ::EVERY].reshape(-1, 3)
+    ways = grid / np.linalg.norm(grid, axis=1, keepdims=True) @ T[:3, :3].T
+    geoms, distances = np.zeros(len(ways), np.int32), np.zeros(len(ways))
+    groups = np.array([0, 0, 1, 0, 0, 0], np.uint8)
+    mujoco.mj_multiRay(
+        model, data, T[:3, 3], ways.ravel(), groups, 1, -1, geoms, distances, None, len(ways), RIGHT_HAND.far
+    )
+    hit = geoms >= 0
+    depth = distances[hit] * (ways[hit] @ T[:3, 2])
+    stereo = STEREO[RIGHT_HAND.name]
+    noise = depth**2 * D400.subpixel / (stereo.focal * stereo.baseline) * rng.standard_normal(len(depth))
+    points = T[:3, 3] + ways[hit] * (distances[hit] * (1.0 + noise / depth))[:, None]
+    return points, model.geom_bodyid[geoms[hit]] == model.body(WARE).id
+
 
 BEFORE, SPARE = 0.12, 0.024
 """Distance from which the hand comes, and how much wider it is open than the grasp asks for [m]; as in `take`."""
@@ -46,10 +135,10 @@ class GraspTrial:
     def __init__(self, model: mujoco.MjModel) -> None:
         """Let the ware of `model` come to rest."""
         self.model, self.data = model, mujoco.MjData(model)
-        self._leader = int(model.body(ware_scene.LEADER).mocapid[0])
-        self._ware, self._wrist = model.body(ware_scene.WARE).id, model.body(ware_scene.WRIST).id
-        self._wrist_q = int(model.joint(ware_scene.WRIST).qposadr[0])
-        self._servos = HandServos(model, ware_scene.SIDE)
+        self._leader = int(model.body(LEADER).mocapid[0])
+        self._ware, self._wrist = model.body(WARE).id, model.body(WRIST).id
+        self._wrist_q = int(model.joint(WRIST).qposadr[0])
+        self._servos = HandServos(model, SIDE)
         far = np.eye(4)
         far[2, 3] = 1.0
         self._put(far, 0.08)
@@ -99,7 +188,7 @@ class GraspTrial:
         command = HandCommand(t=0.0, gap=gap, force=force)
         for T in poses:
             self._aim(T)
-            self._servos.command(command, ware_scene.STEP)
+            self._servos.command(command, STEP)
             self._servos.drive(self.data)
             mujoco.mj_step(self.model, self.data)
 
@@ -113,21 +202,21 @@ class GraspTrial:
 
 
 def _line(start: Array, end: Array, seconds: float) -> Iterable[Array]:
-    for s in np.linspace(0.0, 1.0, round(seconds / ware_scene.STEP)):
+    for s in np.linspace(0.0, 1.0, round(seconds / STEP)):
         T = end.copy()
         T[:3, 3] += (1.0 - s * s * (3.0 - 2.0 * s)) * (start - end)[:3, 3]
         yield T
 
 
 def _still(T: Array, seconds: float) -> Iterable[Array]:
-    for _ in range(round(seconds / ware_scene.STEP)):
+    for _ in range(round(seconds / STEP)):
         yield T
 
 
 def _shaken(T: Array, seconds: float) -> Iterable[Array]:
     """Yield poses that swing sideways, and tilt."""
-    for k in range(round(seconds / ware_scene.STEP)):
-        phase = 2.0 * np.pi * RATE * k * ware_scene.STEP
+    for k in range(round(seconds / STEP)):
+        phase = 2.0 * np.pi * RATE * k * STEP
         swung = T.copy()
         swung[:3, :3] = Rotation.from_rotvec([0.0, TILT * np.sin(phase), 0.0]).as_matrix() @ T[:3, :3]
         swung[:3, 3] += SWING * np.array([np.sin(phase), np.sin(0.5 * phase), 0.0])
@@ -170,11 +259,11 @@ class GraspLabels:
 def label_ware(seed: int, split: str, number: int) -> GraspLabels:
     """Return the labels of one ware; depends on the arguments only."""
     rng = stream(seed, f"grasps/{split}/{number}")
-    draw = ware_scene.draw_ware(rng)
-    model = ware_scene.build_world(draw)
-    pads = [model.geom(magpie_model.finger_names(ware_scene.SIDE, finger)[2]).id for finger in magpie_model.FINGERS]
+    draw = draw_ware(rng)
+    model = build_world(draw)
+    pads = [model.geom(magpie_model.finger_names(SIDE, finger)[2]).id for finger in magpie_model.FINGERS]
     model.geom_friction[pads, 0] = rng.uniform(*FRICTION)
-    mass, ware = rng.uniform(*MASS), model.body(ware_scene.WARE).id
+    mass, ware = rng.uniform(*MASS), model.body(WARE).id
     model.body_mass[ware] *= mass
     model.body_inertia[ware] *= mass
     trial = GraspTrial(model)
@@ -188,21 +277,21 @@ def label_ware(seed: int, split: str, number: int) -> GraspLabels:
 
 
 def propose(
-    model: mujoco.MjModel, data: mujoco.MjData, draw: ware_scene.WareDraw, rng: np.random.Generator
+    model: mujoco.MjModel, data: mujoco.MjData, draw: WareDraw, rng: np.random.Generator
 ) -> tuple[list[Grasp], Array]:
     """Return what `antipodal` proposes for the ware as a palm camera sees it, and the ware's points (n, 3)."""
-    middle = data.xipos[model.body(ware_scene.WARE).id]
+    middle = data.xipos[model.body(WARE).id]
     yaw = float(rng.uniform(-np.pi, np.pi))
     place = middle - WATCH * draw.approach + rng.normal(0.0, 0.015, 3)
     T = grasp_pose(place, yaw, -draw.approach)
     camera = T @ np.linalg.inv(magpie_model.T_HAND_GRIPPER) @ magpie_model.T_HAND_CAMERA
-    points, own = ware_scene.palm_cloud(model, data, camera, rng)
+    points, own = palm_cloud(model, data, camera, rng)
     seen = points[own]
     if len(seen) < MIN_POINTS:
         return [], seen
     position = seen[int(((seen - np.median(seen, axis=0)) ** 2).sum(axis=1).argmin())]
     target = LocalizedObject(Detection(draw.kind, 1.0, np.zeros(4), np.zeros(2)), 0.0, position, seen)
-    grasps = Antipodal().propose(target, points, Gripper(ware_scene.SIDE, T, yaw, draw.approach))
+    grasps = Antipodal().propose(target, points, Gripper(SIDE, T, yaw, draw.approach))
     return grasps, object_points(seen, position)
 
 
@@ -215,16 +304,13 @@ def _off(T: Array, rng: np.random.Generator) -> Array:
 
 
 def label(folder: Path, seed: int, split: str, wares: int) -> GraspLabels:
-    """Try grasps on the wares of a split; files that are there are kept.
+    """Try grasps on the wares of a split; return all labels. Files that are there are kept.
 
     Args:
         folder: where the splits are, one file per `SHARD` wares.
         seed: of the wares.
         split: `"train"` or `"held_out"`; the two never share a ware.
         wares: how many, rounded up to whole files.
-
-    Returns:
-        All labels of the split.
     """
     target = folder / split
     target.mkdir(parents=True, exist_ok=True)

@@ -47,7 +47,7 @@ def average(
         weights: one per network, 0 or more; only their ratios count.
         out: the network to write.
     """
-    from golem.training.legs.average import average as write
+    from golem.training.legs.export_policy import average as write
 
     write(networks, weights, out)
     print(out)

@@ -18,11 +18,7 @@ CURVE = "curve.csv"
 
 
 def read_checkpoint(path: Path) -> dict[str, Any]:
-    """Return what the training of the legs saved at `path`.
-
-    Raises:
-        ConfigError: there is no file, or it is no such checkpoint.
-    """
+    """Return what the training of the legs saved at `path`. Raises ConfigError: there is no such checkpoint."""
     try:
         saved = torch.load(path, map_location="cpu", weights_only=True)
         whole = {"legs", "upper", "steps", "config"} <= saved.keys() and "task" in saved["config"]
@@ -36,20 +32,12 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
 
 
 def read_curve(run: Path) -> dict[str, Array]:
-    """Return the columns of the learning curve in the folder `run`.
-
-    Raises:
-        ConfigError: there is none, or it is empty.
-    """
+    """Return the columns of the learning curve in the folder `run`. Raises ConfigError: it is absent or empty."""
     return _columns(run / CURVE, _rows(run / CURVE))
 
 
 def read_table(table: Path, name: str) -> dict[str, Array]:
-    """Return the columns of the run `name` in a table that `learning_curve.draw_curves` wrote.
-
-    Raises:
-        ConfigError: there is no such table, or no such run in it.
-    """
+    """Return the columns of the run `name` in a table of `draw_curves`. Raises ConfigError: there is none."""
     runs: dict[str, list[dict[str, str]]] = {}
     for row in _rows(table):
         runs.setdefault(row.pop("run", ""), []).append(row)

@@ -49,11 +49,7 @@ class Difficulty:
 
 
 class UpperBodyMotion:
-    """Targets of torso and arms for `n` robots, in motor order of the upper body.
-
-    Attributes:
-        target: (n, 15) joint targets [rad].
-    """
+    """Joint targets (n, 15) [rad] of torso and arms for `n` robots, in motor order of the upper body."""
 
     def __init__(self, n: int, rng: np.random.Generator) -> None:
         limits = load_limits()

@@ -43,9 +43,7 @@ def landing_errors(truth: BatchTruth, twist: Array, gait: Gait) -> Array:
     It means something for a foot in the second half of its swing.
 
     Args:
-        truth: of the robots.
         twist: (n, 3) command [m/s, m/s, rad/s].
-        gait: the clocks.
     """
     heading = heading_frame(truth.R)
     spin = np.einsum("nij,nj->ni", truth.R, truth.rate)
@@ -185,7 +183,6 @@ class LegsEnv:
 
     Attributes:
         difficulty: of the disturbances, and how strict the rewards are.
-        gait: the clocks.
         twist: (n, 3) present command.
         age: (n,) time since each episode began [s].
     """
@@ -272,21 +269,11 @@ class LegsEnv:
         velocity = np.einsum("nji,nj->ni", truth.R, truth.velocity)
         force = np.einsum("nji,nj->ni", truth.R, self._pushes.force)
         known = [
-            2.0 * velocity,
-            0.01 * force,
-            self._pushes.on_torso[:, None],
-            0.002 * truth.force,
-            self.world.payload,
-            self.world.friction[:, None],
-            10.0 * self.world.slope,
-            10.0 * self._capture,
-            10.0 * self._misplaced[:, None],
-            10.0 * truth.clearance,
-            self.upper.target - sensed.q[:, 12:],
-            self._rewards.tracked_error(self.twist),
-            self.gait.stepping[:, None],
-            self.recovers[:, None],
-        ]
+            2.0 * velocity, 0.01 * force, self._pushes.on_torso[:, None], 0.002 * truth.force, self.world.payload,
+            self.world.friction[:, None], 10.0 * self.world.slope, 10.0 * self._capture,
+            10.0 * self._misplaced[:, None], 10.0 * truth.clearance, self.upper.target - sensed.q[:, 12:],
+            self._rewards.tracked_error(self.twist), self.gait.stepping[:, None], self.recovers[:, None],
+        ]  # fmt: skip
         return SEEN.observe(signals), np.concatenate(known, axis=1)
 
     def step(self, action: Array, steered: Rows, speeds: Array) -> Step:
@@ -310,18 +297,9 @@ class LegsEnv:
         self.world.step(target, self.upper.target, self._pushes.force, self._pushes.on_torso, round(dt / STEP))
         truth = self.world.truth
         reward, terms = self._rewards(
-            truth,
-            self.twist,
-            self.gait,
-            action,
-            self._action,
-            self._capture,
-            self._misplaced,
-            landing_errors(truth, self.twist, self.gait),
-            self.recovers,
-            self.difficulty.strictness,
-            dt,
-        )
+            truth, self.twist, self.gait, action, self._action, self._capture, self._misplaced,
+            landing_errors(truth, self.twist, self.gait), self.recovers, self.difficulty.strictness, dt,
+        )  # fmt: skip
         self._action = action
         self.age += dt
         low = truth.height - truth.clearance.mean(axis=1) < 0.6

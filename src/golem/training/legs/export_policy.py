@@ -5,6 +5,8 @@ The graph is written node by node, mirror and all, so that the file depends on n
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -37,11 +39,7 @@ TRAINED = "golem.trained"
 
 
 def load_actor(path: Path) -> Actor:
-    """Return the trained actor of a checkpoint of `train`, or of a network that `export` wrote (`.onnx`).
-
-    Raises:
-        ConfigError: it is neither.
-    """
+    """Return the trained actor of a checkpoint, or of an exported network (`.onnx`). Raises ConfigError: neither."""
     if path.suffix == ".onnx":
         return _exported_actor(path)
     return _trained_actor(read_checkpoint(path))
@@ -77,11 +75,7 @@ def _linear(actor: Actor) -> list[nn.Linear]:
 
 
 def export(checkpoint: Path, folder: Path) -> tuple[Path, Path]:
-    """Write `folder/almi_TASK.onnx` and `.yaml` from a checkpoint; return both paths.
-
-    Raises:
-        ConfigError: it is no checkpoint.
-    """
+    """Write `folder/almi_TASK.onnx` and `.yaml` of a checkpoint; return both. Raises ConfigError: it is none."""
     saved = read_checkpoint(checkpoint)
     task: Task = saved["config"]["task"]
     name = f"almi_{task}"
@@ -170,3 +164,38 @@ def _description(network: str, config: EnvConfig) -> str:
     }
     head = "# A shipped leg policy; written by `golem train legs export`, see docs/how-to/train-legs.md.\n"
     return head + yaml.safe_dump(data, sort_keys=False, default_flow_style=None, width=110)
+
+
+def average(networks: Sequence[Path], weights: Sequence[float], out: Path) -> None:
+    """Write the weighted mean of exported networks to `out`, with what trained each of them.
+
+    Wortsman et al., "Model soups: averaging weights of multiple fine-tuned models improves accuracy without increasing
+    inference time", ICML 2022. Networks that were trained apart from the first step on have nothing in common, and
+    their mean does nothing.
+
+    Raises:
+        ConfigError: a file is no such network, the weights do not fit, or `out` is no name of a network.
+    """
+    if len(networks) < 2 or len(weights) != len(networks):
+        raise ConfigError("Give two networks or more, and --weights with a number for each of them.")
+    if not all(0.0 <= w < math.inf for w in weights) or sum(weights) == 0.0:
+        raise ConfigError("--weights are numbers of 0 or more, and not all of them 0.")
+    if out.suffix != ".onnx" or any(path.suffix != ".onnx" for path in networks):
+        raise ConfigError("Networks are files that end in .onnx; 'golem train legs export' makes them of checkpoints.")
+    share = torch.tensor(weights, dtype=torch.float64) / sum(weights)
+    actors = [load_actor(path) for path in networks]
+    mean = actors[0]
+    with torch.no_grad():
+        for parts in zip(*(actor.net.parameters() for actor in actors), strict=True):
+            stacked = torch.stack([part.double() for part in parts])
+            parts[0].copy_(torch.tensordot(share, stacked, dims=1))
+    graph = graph_of(mean)
+    said = "; ".join(f"{w:g} x {path.name}: {_trained(path)}" for w, path in zip(weights, networks, strict=True))
+    helper.set_model_props(graph, {TRAINED: f"golem train legs average: {said}"})
+    out.parent.mkdir(parents=True, exist_ok=True)
+    onnx.save(graph, str(out))
+
+
+def _trained(network: Path) -> str:
+    said = {prop.key: prop.value for prop in onnx.load(str(network)).metadata_props}
+    return said.get(TRAINED, "unknown")

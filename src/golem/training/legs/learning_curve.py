@@ -37,13 +37,7 @@ COLOURS = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#8
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """One run.
-
-    Attributes:
-        name: how the picture calls it.
-        columns: what it says, one value per row.
-        thin: updates per row.
-    """
+    """One run: its name in the picture, its `columns` of one value per row, `thin` updates per row."""
 
     name: str
     columns: dict[str, Array]
@@ -51,11 +45,7 @@ class Curve:
 
     @classmethod
     def of(cls, run: Path) -> Curve:
-        """Return the curve of a run's folder, or of TABLE.csv:RUN, a run of a table from here.
-
-        Raises:
-            ConfigError: there is none.
-        """
+        """Return the curve of a run's folder, or of TABLE.csv:RUN. Raises ConfigError: there is none."""
         table, colon, name = str(run).rpartition(":")
         if colon and table.endswith(".csv"):
             return cls(name, read_table(Path(table), name), THIN)

@@ -20,12 +20,7 @@ _FLIPPED = {
 
 
 class Mirror:
-    """A permutation with signs: `mirrored = values[..., order] * sign`.
-
-    Attributes:
-        order: (n,) where each mirrored value comes from.
-        sign: (n,) 1 or -1.
-    """
+    """A permutation with signs: `mirrored = values[..., order] * sign`, (n,) each."""
 
     def __init__(self, components: Sequence[tuple[str, str]]) -> None:
         """Mirror vectors of `components`, each a term and the name of its component as in `Layout.components`."""

@@ -167,7 +167,6 @@ class Rewards:
         Args:
             truth: after the period.
             twist: (n, 3) command [m/s, m/s, rad/s].
-            gait: the clocks.
             action: (n, 12) of this period.
             last: (n, 12) of the one before.
             capture: (n, 2) capture point from the middle of the feet, heading frame [m].

@@ -47,11 +47,7 @@ class ShardedEnv:
     """
 
     def __init__(self, n: int, config: EnvConfig, seed: int, shards: int) -> None:
-        """Start every robot; shard k begins with the seed `(seed, k)`.
-
-        Raises:
-            ConfigError: the robots cannot be shared out evenly.
-        """
+        """Start every robot; shard k begins with `(seed, k)`. Raises ConfigError: they cannot be shared out evenly."""
         if shards < 1 or n % shards:
             raise ConfigError(f"--shards is a divisor of the number of robots, {n}, not {shards}.")
         # Not forked: threads of PyTorch would be missing in the child.
@@ -75,19 +71,11 @@ class ShardedEnv:
         self._hear()
 
     def step(self) -> None:
-        """Let every robot act as its row says, and start those anew whose episode is over.
-
-        Raises:
-            GolemError: a process has died.
-        """
+        """Let every robot act as its row says, or start anew after its episode. Raises GolemError: a process died."""
         self._tell(None)
 
     def reseed(self, steps: int) -> None:
-        """Begin with other draws, those of a run that goes on after `steps`.
-
-        Raises:
-            GolemError: a process has died.
-        """
+        """Begin with other draws, those of a run that goes on after `steps`. Raises GolemError: a process has died."""
         self._tell(steps)
 
     def close(self) -> None:

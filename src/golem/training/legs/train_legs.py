@@ -205,11 +205,7 @@ class _Run:
         os.replace(part, path)
 
     def load(self, path: Path) -> None:
-        """Go on from a checkpoint, with new episodes.
-
-        Raises:
-            ConfigError: it was made with another seed, network, task or reward.
-        """
+        """Go on from a checkpoint, with new episodes. Raises ConfigError: of another seed, network, task or reward."""
         saved = read_checkpoint(path)
         free = ("out", "steps", "device", "seconds")
         mine = {k: v for k, v in _plain(self.config).items() if k not in free}

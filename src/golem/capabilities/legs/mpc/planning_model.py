@@ -251,8 +251,7 @@ class _UpperBody:
         xx, yy, zz, xy, xz, yz, mx, my, mz, mass = data.cinert[self._bodies].sum(axis=0)
         r = np.array([mx, my, mz]) / mass
         about = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        inertia = about - mass * (r @ r * np.eye(3) - np.outer(r, r))
-        return float(mass), data.subtree_com[1] + r, inertia
+        return float(mass), data.subtree_com[1] + r, about - mass * (r @ r * np.eye(3) - np.outer(r, r))
 
 
 def _legs_spec(kp: Array, kd: Array, torque: Array, timestep: float) -> mujoco.MjSpec:

@@ -21,6 +21,8 @@ from golem.types import LEGS, NUM_JOINTS
 
 ASSUMED_TWISTS = Envelope((-0.5, 0.8), (-0.3, 0.3), (-0.5, 0.5))
 """Twists of a policy that says nothing about them [own: what public walking policies of the H1-2 can follow]."""
+FOLLOWS = f"It can follow vx {ASSUMED_TWISTS.vx}, vy {ASSUMED_TWISTS.vy} m/s, wz {ASSUMED_TWISTS.wz} rad/s."
+"""The same, as what had to be assumed."""
 PERIOD = 0.8
 """Period of a gait clock that a policy sees and does not describe [s]: unitree_rl_gym's."""
 
@@ -41,7 +43,6 @@ class Passport:
 
     Attributes:
         format: what the file is.
-        file: that file.
         description: what it says, in our words.
         network: path of the network, which may not exist.
         assumed: what the file does not say, a sentence each.
@@ -67,11 +68,7 @@ class Passport:
 
 
 def joint_names(names: Sequence[object]) -> tuple[str, ...]:
-    """Return `names` as ours, without what stands before a slash.
-
-    Raises:
-        ConfigError: one is no joint of the robot.
-    """
+    """Return `names` as ours, without what stands before a slash. Raises ConfigError: one is no joint of the robot."""
     plain = tuple(str(name).rpartition("/")[2] for name in names)
     for name in plain:
         if name not in JOINT_INDEX:
@@ -80,11 +77,7 @@ def joint_names(names: Sequence[object]) -> tuple[str, ...]:
 
 
 def numbers(what: str, value: object, size: int) -> tuple[float, ...]:
-    """Return `value`, a number or a list of `size`, as `size` numbers.
-
-    Raises:
-        ConfigError: it is neither.
-    """
+    """Return `value`, a number or a list of `size`, as `size` numbers. Raises ConfigError: it is neither."""
     row = cast("Sequence[object]", value if isinstance(value, list | tuple) else [value] * size)
     if len(row) != size or not all(isinstance(x, int | float) and not isinstance(x, bool) for x in row):
         raise ConfigError(f"The {what} is a number or a list of {size}, not {shorten(repr(cast(object, value)))}.")
@@ -115,7 +108,6 @@ def read_term(
     """Return the term of ours that a trainer calls `name`.
 
     Args:
-        name: its name there.
         joints: the joints that it shows, if it shows some.
         actions: the joints that the network moves.
         scale: None, a number or a list.
@@ -173,11 +165,7 @@ def first_file(candidates: Sequence[Path]) -> Path:
 
 
 def at(data: Mapping[str, Any], *keys: str) -> Any:
-    """Return what stands under `keys`.
-
-    Raises:
-        ConfigError: one of them is absent.
-    """
+    """Return what stands under `keys`. Raises ConfigError: one of them is absent."""
     value: Any = data
     for i, key in enumerate(keys):
         if not isinstance(value, Mapping) or key not in value:

@@ -1,0 +1,44 @@
+"""A gantry that loosens fasteners beside the robot: what it says, where it works, and what it is done with."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection
+
+from golem.interfaces import topics
+from golem.middleware.bus import News
+from golem.skills.context import Context
+
+SENTENCE = re.compile(r"\s*Remove: (\S{1,60}) with confidence = (\S{1,20})\s*")
+"""On the topic `/triggered_behavior`."""
+KEEP_OFF = 0.9
+"""Distance from where the gantry works at which nobody stands or reaches [m] [own]."""
+SILENT = 90.0
+"""Time without a word after which no more is waited for [s]; a removal takes RAPID 20 s."""
+
+
+class Gantry:
+    """Listens at every tick.
+
+    Attributes:
+        at: name of the fastener it is at, where it stays until it says another one; empty before its first word.
+        loosened: names of those it is done with.
+        t: time of its last word [s], first that of the beginning.
+    """
+
+    def __init__(self, context: Context, names: Collection[str]) -> None:
+        """Hear what comes from now on, in the stack of `context`, of the fasteners called `names`."""
+        self._context, self._names, self._news = context, names, News(context.bus, topics.REMOVALS)
+        self.at, self.loosened, self.t = "", set[str](), context.t
+
+    def __call__(self) -> None:
+        """Listen."""
+        said = SENTENCE.fullmatch((self._news.read() or "")[:100])
+        if said is not None and said[1] in self._names:
+            self.loosened |= {self.at} - {said[1], ""}
+            self.at, self.t = said[1], self._context.t
+
+    @property
+    def silent(self) -> bool:
+        """Whether nothing more is to be expected of it."""
+        return self._context.t - self.t > SILENT
