@@ -15,7 +15,7 @@ from golem.datasets import commands, swap
 from golem.datasets import episode_writer as writing
 from golem.datasets.commands import findings as check
 from golem.datasets.episode_writer import DatasetWriter
-from golem.datasets.schema import DatasetError, Recipe
+from golem.datasets.schema import DatasetError, Feature, Recipe
 from golem.datasets.store import DatasetFolder
 from golem.errors import GolemError, OutputError
 
@@ -140,6 +140,33 @@ def test_split_and_merge(dataset: Path, tmp_path: Path) -> None:
 
 def full(*_: Any, **__: Any) -> None:
     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+@pytest.mark.parametrize("wrong", [[4, 5, 3, 9], [None, None, None, None]])
+def test_pictures_of_an_encoder_whose_times_go_back_keep_their_own(tmp_path: Path, wrong: list[int | None]) -> None:
+    av = pytest.importorskip("av")
+    video = writing.Video(tmp_path / "a.mp4", Feature("video", (64, 96, 3), ["height", "width", "channel"]), 30)
+
+    class Racing:
+        """The encoder, with other times on some packets."""
+
+        def __init__(self, stream: Any) -> None:
+            self._stream, self._wrong = stream, list(wrong)
+
+        def encode(self, frame: Any) -> Any:
+            for packet in self._stream.encode(frame):
+                if self._wrong:
+                    packet.pts = packet.dts = self._wrong.pop()
+                yield packet
+
+    video._stream = Racing(video._stream)  # pyright: ignore[reportPrivateUsage]
+    for shade in range(0, 240, 12):
+        video.add(np.full((64, 96, 3), shade, np.uint8))
+    video.finish()
+    with av.open(str(tmp_path / "a.mp4")) as file:
+        seen = [(frame.time, frame.to_ndarray(format="rgb24").mean()) for frame in file.decode(video=0)]
+    assert np.allclose([time for time, _ in seen], np.arange(20) / 30)
+    assert np.allclose([shade for _, shade in seen], range(0, 240, 12), atol=3)
 
 
 @pytest.mark.parametrize("where", ["video", "data", "commit", "sync"])

@@ -53,7 +53,7 @@ class Video:
 
     def __init__(self, path: Path, feature: Feature, fps: int) -> None:
         os.environ.setdefault("SVT_LOG", "1")  # else the encoder writes a page to the terminal
-        self._av, self.counts = extra("av"), np.zeros((3, 256))
+        self._av, self.counts, self._given, self._written = extra("av"), np.zeros((3, 256)), 0, 0
         self._out = self._av.open(str(path), "w")
         self._stream = self._out.add_stream(CODEC, rate=fps, options={"crf": f"{CRF}", "g": f"{GOP}", "preset": "11"})
         self._stream.height, self._stream.width = feature.shape[:2]
@@ -64,19 +64,27 @@ class Video:
     def add(self, picture: NDArray[Any]) -> None:
         """Append one picture (height, width, 3)."""
         self._write(self._av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), "rgb24"))
+        self._given += 1
         for channel in range(3):
             self.counts[channel] += np.bincount(picture[::LOOK, ::LOOK, channel].ravel(), minlength=256)
 
     def finish(self) -> None:
-        """Complete the file."""
+        """Complete the file; an OSError if the encoder kept a picture to itself."""
         self._write(None)
         self._out.close()
+        if self._written != self._given:
+            raise OSError(f"the encoder gave {self._written} of {self._given} pictures")
 
     def _write(self, frame: Any) -> None:
-        """Encode a frame, or what is left, and write it: AV1 is stored in the order in which it is shown."""
+        """Encode a frame, or what is left, and write it: a packet of AV1 shows one picture, and they come in order.
+
+        So their number is their time, in units of the codec. A busy encoder's own times may go back, which the file
+        refuses.
+        """
         for packet in self._stream.encode(frame):
-            packet.dts = packet.pts  # a busy encoder's own may go back, which the file refuses
+            packet.pts = packet.dts = self._written
             self._out.mux(packet)
+            self._written += 1
 
     def drop(self) -> None:
         """Close without completing."""
