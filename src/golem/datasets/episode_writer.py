@@ -22,8 +22,10 @@ from golem.datasets.swap import beside, held, link, replaced
 from golem.errors import OutputError
 
 CODEC, GOP, CRF = "libsvtav1", 10, 30
-"""Encoder (BSD, as LeRobot's own), distance of key frames, quality [own: 11 ms of CPU a VGA frame; LeRobot's
-distance of 2 takes 60]."""
+"""Encoder (BSD, as LeRobot's own), distance of key frames, quality [own: LeRobot's 2 takes five times the CPU]."""
+LEVEL = "lp=1"
+"""Least parallelism: with more, SVT-AV1 4.1 loses the order of pictures on a busy machine, for the same
+bits and 1.4 times the CPU [own]."""
 BATCH = 64
 """Frames whose depth and masks are held in memory [own: 40 MB of VGA depth]."""
 LOOK = 8
@@ -55,7 +57,8 @@ class Video:
         os.environ.setdefault("SVT_LOG", "1")  # else the encoder writes a page to the terminal
         self._av, self.counts, self._given, self._written = extra("av"), np.zeros((3, 256)), 0, 0
         self._out = self._av.open(str(path), "w")
-        self._stream = self._out.add_stream(CODEC, rate=fps, options={"crf": f"{CRF}", "g": f"{GOP}", "preset": "11"})
+        options = {"crf": f"{CRF}", "g": f"{GOP}", "preset": "11", "svtav1-params": LEVEL}
+        self._stream = self._out.add_stream(CODEC, rate=fps, options=options)
         self._stream.height, self._stream.width = feature.shape[:2]
         self._stream.pix_fmt = "yuv420p"
         with own_priority():
@@ -76,15 +79,10 @@ class Video:
             raise OSError(f"the encoder gave {self._written} of {self._given} pictures")
 
     def _write(self, frame: Any) -> None:
-        """Encode a frame, or what is left, and write it: a packet of AV1 shows one picture, and they come in order.
-
-        So their number is their time, in units of the codec. A busy encoder's own times may go back, which the file
-        refuses.
-        """
-        for packet in self._stream.encode(frame):
-            packet.pts = packet.dts = self._written
-            self._out.mux(packet)
-            self._written += 1
+        """Encode a frame, or what is left, and write it: each packet shows one picture."""
+        packets = self._stream.encode(frame)
+        self._out.mux(packets)
+        self._written += len(packets)
 
     def drop(self) -> None:
         """Close without completing."""
