@@ -154,7 +154,7 @@ def test_a_skill_can_be_started_only_when_none_runs(twin: tuple[LockstepRunner, 
 def test_the_form_has_a_field_for_each_of_the_goal(view: LiveView) -> None:
     panel = view.panel.skill
     panel.fill("pick", label="bolt", side="left")
-    places = {"avoid": [], "wanted": [], "level": [], "container_at": [], "off": []}
+    places = {"avoid": [], "wanted": [], "level": [], "container_at": [], "off": [], "landmarks": []}
     assert panel.chosen == ("pick", {"label": "bolt", "container": "tray", "side": "left"} | places)
     panel.fill("walk", x=1.5)
     goal = {"x": 1.5, "y": 0.0, "yaw": 0.0, "frame": "base_link", "timeout": 60.0}

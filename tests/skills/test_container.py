@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from golem.capabilities.perception.open_box import OpenBox
-from golem.skills.pick_targets import Container, shift_of
+from golem.skills.hand_offset import shift_of
+from golem.skills.pick_targets import Container
 from golem.types import Array, Detection, LocalizedObject
 
 ROW = np.array([[0.43, y, -0.03] for y in (-0.2, -0.1, 0.0)])

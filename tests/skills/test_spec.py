@@ -96,8 +96,8 @@ for _ in range(30):
     [
         (
             {"lable": "x"},
-            "Unknown goal field of pick 'lable'; valid: avoid, container, container_at, label, level, off, side, "
-            "wanted. Did you mean 'label'",
+            "Unknown goal field of pick 'lable'; valid: avoid, container, container_at, label, landmarks, level, "
+            "off, side, wanted. Did you mean 'label'",
         ),
         ({"label": 3}, "'label' is a word, not 3"),
         ({"side": "middle"}, "'middle'; valid: either, left, right"),

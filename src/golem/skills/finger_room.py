@@ -26,6 +26,8 @@ TIPS: float = float(T_HAND_GRIPPER[2, 3] - T_HAND_CAMERA[2, 3]) + 0.004
 """Depth up to which the image may show the fingers themselves [m]."""
 MARGIN = 0.003
 """What is this near to a finger is in its way [m]: base and encoders move by that much on the way down."""
+CLOSE = 0.008
+"""What is this near to a finger it may meet: there the hand is slow [m]."""
 STRAYS = 3
 """So many cells may stand higher than what counts: noise of the depth comes alone."""
 ROUGH = 0.006
@@ -62,7 +64,7 @@ class FingerRoom:
         self._context, self._camera = context, f"{side}_hand"
         self._middle = context.arms[side].commanded[:2, 3].copy()
         self._heights = np.full((2 * HALF, 2 * HALF), np.nan)
-        self._tips = _fingertips(gap)
+        self._tips, self._around = _fingertips(gap, MARGIN), _fingertips(gap, CLOSE)
         self._turn = self._wanted = self._blocked_for = 0.0
         self.blocked = self.across = False
 
@@ -107,7 +109,7 @@ class FingerRoom:
         missing = -self.below(T)
         up = ABOVE + missing if missing > ROUGH else min(max(KEPT + missing, 0.0), RAISED)
         T = lifted(T, up)
-        room = min(self.below(T_now), self.below(at_height(T, T_now[2, 3])))
+        room = min(self._room(self._around, T_now), self._room(self._around, at_height(T, T_now[2, 3])))
         return T, min(max(GAIN * room, SLOW), speed)
 
     def _misses(self, T_goal: Array, turn: float) -> float:
@@ -119,7 +121,10 @@ class FingerRoom:
 
         Negative: they would be within it. inf: nothing was seen there.
         """
-        tips = self._tips @ T[:3, :3].T + T[:3, 3]
+        return self._room(self._tips, T)
+
+    def _room(self, tips: Array, T: Array) -> float:
+        tips = tips @ T[:3, :3].T + T[:3, 3]
         cells = self._cells(tips).clip(0, 2 * HALF - 1)
         room = tips[:, 2] - self._heights[cells[:, 0], cells[:, 1]]
         room = np.sort(room[np.isfinite(room)])
@@ -130,10 +135,10 @@ class FingerRoom:
         return np.floor((points[:, :2] - self._middle) / CELL).astype(np.int64) + HALF
 
 
-def _fingertips(gap: float) -> Array:
-    """Return (n, 3) points that cover the ends of both open fingers, in the grasp frame [m]."""
-    x = np.arange(-FINGER[0] - MARGIN, FINGER[0] + MARGIN + 1e-9, CELL)
-    y = np.arange(0.5 * gap - MARGIN, 0.5 * gap + FINGER[1] + MARGIN + 1e-9, CELL)
+def _fingertips(gap: float, margin: float) -> Array:
+    """Return (n, 3) points that cover the ends of both open fingers and `margin` [m] around, in the grasp frame [m]."""
+    x = np.arange(-FINGER[0] - margin, FINGER[0] + margin + 1e-9, CELL)
+    y = np.arange(0.5 * gap - margin, 0.5 * gap + FINGER[1] + margin + 1e-9, CELL)
     xy = np.stack(np.meshgrid(x, np.concatenate((-y, y))), axis=-1).reshape(-1, 2)
     return np.column_stack((xy, np.zeros(len(xy))))
 

@@ -7,7 +7,9 @@ from dataclasses import astuple, dataclass, field
 from enum import StrEnum
 from pathlib import Path
 
+import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from golem.capabilities.memory.memory_file import SqliteFile
 from golem.errors import ConfigError
@@ -171,6 +173,12 @@ class JobFile(SqliteFile):
             question = f"INSERT INTO events ({names}) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?) RETURNING happened"
             [(happened,)] = self._base.execute(question, values).fetchall()
         _take(one, fate, reason, side, tray, stance, t, happened, picture)
+
+    def keep(self, one: PackFastener, rgb: NDArray[np.uint8]) -> str:
+        """Write a picture of a fastener's place beside the file; return its path from there, empty if that fails."""
+        path = self.path.with_name(f"{self.path.stem}_pictures") / f"{one.number:03d}_{one.tries}.jpg"
+        path.parent.mkdir(exist_ok=True)
+        return f"{path.parent.name}/{path.name}" if cv2.imwrite(str(path), rgb[:, :, ::-1]) else ""
 
 
 def _take(

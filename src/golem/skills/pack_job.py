@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-import cv2
 import numpy as np
 
 from golem.capabilities.navigation.goto import GoTo
@@ -21,7 +20,7 @@ from golem.skills.navigate import NavigateGoal
 from golem.skills.pack_picture import pack_picture
 from golem.skills.pack_plan import PackSides, PackStop, make_plan
 from golem.skills.pack_view import NOTHING, SeenRim, fit_frames, matched, see_edge, see_fasteners
-from golem.skills.pick_config import PickGoal, PickOutcome, PickReport, Sight, Tried
+from golem.skills.pick_config import PickGoal, PickOutcome, PickReport, Sight
 from golem.skills.pick_targets import WANTED
 from golem.skills.stance_choice import OVER_TRAY, takes, within_reach
 from golem.types import Array, PlanarPose, Side
@@ -40,6 +39,8 @@ LONG = 0.25
 """Extent of the fasteners by which the turn of the pack is measured [m]."""
 FARTHEST_OFF = 0.08
 """How far a palm camera may see things elsewhere than the head camera [m]: each is off by centimetres."""
+AROUND = 0.3
+"""What stands this near to a fastener a palm camera may see with it [m]."""
 BESIDE = 1.0
 """A stance this near is gone to straight along the edge [m]."""
 BACK = 0.35
@@ -108,6 +109,11 @@ class PackJob:
             if not self._near_gantry(one.place[:2]):
                 await self._tell(one, Fate.OUT_OF_REACH, "From no stance a hand reaches it and a container for it.")
         return self._summary(self._context.t - start)
+
+    @property
+    def _left(self) -> list[PackFastener]:
+        """What is in no tray."""
+        return [one for one in self._book.fasteners if one.fate is not Fate.IN_TRAY]
 
     def _wanted(self, one: PackFastener) -> bool:
         """Return whether a fastener is to be taken now."""
@@ -195,6 +201,12 @@ class PackJob:
         there = self._T_odom_pack @ PlanarPose(at.x, at.y, 0.0)
         return np.array([there.x, there.y])
 
+    def _level(self, one: PackFastener) -> float:
+        """Return how high a fastener stands in odom, as the head camera sees it [m]."""
+        return (
+            float(self._context.T_odom_base[2, 3]) + self._rim.at(one.place) - self._context.legs.height + one.listed.z
+        )
+
     async def _find(self) -> None:
         """Find the pack by the edge that the robot stands before."""
         edge = await see_edge(self._context)
@@ -278,7 +290,7 @@ class PackJob:
     async def _find_again(self, label: str, container: str) -> None:
         """Measure where the pack is by what the head camera shows of it: first by the container, then by the rest."""
         seen = await see_fasteners(self._context, label, container, NOTHING, False)
-        ones = [one.place for one in self._book.fasteners if one.label == label and one.fate is not Fate.IN_TRAY]
+        ones = [one.place for one in self._left if one.label == label]
         known, T = np.array(ones).reshape(-1, 3), self._T_pack_base.matrix()
         places = seen.places[:, :2] @ T[:2, :2].T + T[:2, 3]
         boxes = np.array([(c.x, c.y) for c in self._book.containers if c.kind == container]).reshape(-1, 2)
@@ -302,10 +314,9 @@ class PackJob:
         """Look whether a fastener that may be anywhere is in its place: what is seen nearer to another is that."""
         there, container, T = self._in_odom(one)[None], self._container(one.label), self._context.T_odom_base
         seen = await see_fasteners(self._context, one.label, container, NOTHING, False, there)
-        left = [other for other in self._book.fasteners if other.fate is not Fate.IN_TRAY]
-        known = np.array([self._in_odom(other) for other in left])
+        known = np.array([self._in_odom(other) for other in self._left])
         away = np.linalg.norm((seen.places @ T[:3, :3].T + T[:3, 3])[:, None, :2] - known, axis=2)
-        return any(left[int(k)] is one for k in away.argmin(axis=1))
+        return any(self._left[int(k)] is one for k in away.argmin(axis=1))
 
     async def _take(self, one: PackFastener, side: Side) -> PickOutcome:
         """Try one fastener, and keep what came of it."""
@@ -314,14 +325,16 @@ class PackJob:
         (x, y), name = self._in_odom(one).tolist(), container if listed is None else listed.name
         at = () if listed is None else tuple(self._in_odom(listed).tolist())
         off = tuple(self._off[side].tolist()) if side in self._off else ()
-        rim = self._rim.at(one.place) - self._context.legs.height
-        level = float(self._context.T_odom_base[2, 3]) + rim + one.listed.z
-        goal = PickGoal(one.label, container, side, wanted=(x, y), level=(level,), container_at=at, off=off)
+        near = [
+            f for f in self._book.fasteners if f.fate is not Fate.IN_TRAY and math.dist(f.place, one.place) < AROUND
+        ]
+        marks = tuple(v for f in near for v in (*self._in_odom(f).tolist(), self._level(f)))
+        goal = PickGoal(one.label, container, side, (), (x, y), (self._level(one),), at, off, marks)
         result = await self._context.run("pick", goal)
         found = result.value if isinstance(result.value, PickReport) else PickReport()
         self.report.picks.append(found)
         outcome, reason, fate = PickOutcome(found.outcome), result.reason, Fate.OPEN
-        taken = self._which(one, found.tried[-1]) if found.tried and outcome in AT_IT else one
+        taken = self._which(one, found) if found.tried and outcome in AT_IT else one
         if taken is not one:
             await self._tell(one, Fate.OPEN, f"A hand came to {taken.listed.name} instead.")
         tries = 1 if outcome is PickOutcome.TIGHT and self._goal.loosened == "unknown" else TRIES
@@ -347,10 +360,10 @@ class PackJob:
             raise StageFailed(result.stage, result.slot or "skill", result.reason)
         return outcome
 
-    def _which(self, one: PackFastener, tried: Tried) -> PackFastener:
+    def _which(self, one: PackFastener, found: PickReport) -> PackFastener:
         """Return which fastener a hand was at that was sent to `one`, and learn what the palm cameras are off by."""
-        place, there = np.array([tried.x, tried.y]), [f for f in self._book.fasteners if f.fate is not Fate.IN_TRAY]
-        known = self._off.get(tried.side, np.zeros(2))
+        there, tried = self._left, found.tried[-1]
+        place, known = np.array([tried.x, tried.y]), np.array(found.off or self._off.get(tried.side, (0.0, 0.0)))
         left = [np.linalg.norm(place - known - self._in_odom(each)) for each in there]
         nearest = int(np.argmin(left))
         taken = there[nearest] if left[nearest] < WANTED / 2 else one
@@ -373,14 +386,7 @@ class PackJob:
     async def _picture(self, one: PackFastener) -> str:
         """Keep what the head camera shows; return the path of the picture, from the folder of the job."""
         frame = self._context.bus.latest(topics.rgbd_images("head"))
-        folder = self._book.path.with_name(f"{self._book.path.stem}_pictures")
-        path = folder / f"{one.number:03d}_{one.tries}.jpg"
-
-        def write() -> bool:
-            folder.mkdir(exist_ok=True)
-            return frame is not None and cv2.imwrite(str(path), frame.rgb[:, :, ::-1])
-
-        return f"{folder.name}/{path.name}" if frame and await self._context.think(write, 0.0) else ""
+        return await self._context.think(lambda: self._book.keep(one, frame.rgb), 0.0) if frame else ""
 
     def _summary(self, seconds: float) -> SkillResult:
         ones = self._book.fasteners

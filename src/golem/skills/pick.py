@@ -16,6 +16,7 @@ from golem.skills.base import SkillCancelled, SkillResult, StageFailed
 from golem.skills.context import Context
 from golem.skills.finger_room import ACROSS, FingerRoom
 from golem.skills.force_guard import CLOSED, ForceGuard
+from golem.skills.hand_offset import learn_offset
 from golem.skills.pack_view import see_fasteners
 from golem.skills.pick_config import PickConfig, PickFailed, PickGoal, PickOutcome, PickReport, Sight, outcome_of
 from golem.skills.pick_place import look_after, place, pull
@@ -51,7 +52,7 @@ class Pick:
         self._report = PickReport()
         self._heights: list[float] = []
         self._looks_again = self._across = False
-        self._off, self._sure = np.zeros(3), False
+        self._off, self._sure, self._landmarks = np.zeros(3), False, np.zeros((0, 3))
         self._seen: Array | None = None
 
     def timeout(self, goal: PickGoal) -> float:
@@ -62,6 +63,7 @@ class Pick:
         """Pick one object with whatever grasp method the stack chose; see `Skill`."""
         self._method, self._names = context.grasp_method(), names_of(goal.label, goal.wanted)
         self._off, self._sure = np.array([*(goal.off or (0.0, 0.0)), 0.0]), bool(goal.off)
+        self._landmarks = np.array(goal.landmarks).reshape(-1, 3)
         await self._choose_height(context, goal)
         lines = LineTravel(context, self._config.travel_height, self._config.tolerance)
         planned = self._config.travel == "planned"
@@ -171,7 +173,9 @@ class Pick:
             tried.append(attempt)
             self._report.tried.append(attempt.first_seen)
             try:
-                await self._take(context, attempt, await self._approach(context, attempt), timings)
+                grasp = await self._approach(context, attempt)
+                await self._learn(context, attempt)
+                await self._take(context, attempt, grasp, timings)
                 return attempt
             except StageFailed as failure:
                 refused = failure.stage == "approach"
@@ -199,6 +203,13 @@ class Pick:
             else:
                 return grasps[0]
         raise refused[0]
+
+    async def _learn(self, context: Context, attempt: Attempt) -> None:
+        """Learn what the hand's own camera is off by, where one object is wanted and may be taken for its neighbour."""
+        if not self._sure and len(self._landmarks):
+            off = await learn_offset(context, attempt.side, self._names, self._landmarks)
+            self._off, self._sure = (self._off, False) if off is None else (off, True)
+        self._report.off = tuple(self._off[:2].tolist()) if self._sure else ()
 
     def _aim(self, attempt: Attempt) -> LocalizedObject:
         """Return the object where the hand's own camera is expected to show it."""

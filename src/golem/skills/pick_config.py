@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Literal
@@ -80,12 +81,14 @@ class PickReport:
         tried: every object that was approached, in order.
         in_tray: whether the head camera saw it in the container afterwards, one of `Sight`.
         bore_empty: whether it saw that the object's place is empty, one of `Sight`.
+        off: by how much, along x and y, the hand's own camera was known to see things elsewhere [m]; () where unknown.
     """
 
     outcome: str = PickOutcome.FAILED.value
     tried: list[Tried] = field(default_factory=list[Tried])
     in_tray: str = Sight.UNKNOWN.value
     bore_empty: str = Sight.UNKNOWN.value
+    off: tuple[float, ...] = ()
 
 
 class PickFailed(StageFailed):
@@ -139,6 +142,8 @@ class PickGoal:
         container_at: x, y in odom of the only container that counts, likewise; none: whichever is seen best.
         off: x, y in odom by how much a palm camera sees things elsewhere than the head camera does [m]. Where it is
             known, what the palm camera shows elsewhere is not the object; none: it is not.
+        landmarks: x, y, z in odom of what stands there by a list, for the head camera [m]: by them a hand learns what
+            its camera is off by, where that is not known.
     """
 
     label: str = "screw"
@@ -149,12 +154,15 @@ class PickGoal:
     level: tuple[float, ...] = ()
     container_at: tuple[float, ...] = ()
     off: tuple[float, ...] = ()
+    landmarks: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         if not (self.label and self.container):
             raise ConfigError("A pick names the class of the object and that of its container.")
         for places in (self.avoid, self.wanted, self.container_at, self.off):
             floor_places("a pick", places)
+        if len(self.landmarks) % 3 or not all(map(math.isfinite, self.landmarks)):
+            raise ConfigError("The landmarks of a pick are x, y, z of each: finite numbers, three by three.")
 
 
 @dataclass(frozen=True)

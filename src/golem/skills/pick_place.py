@@ -11,8 +11,9 @@ from golem.interfaces.payloads import GripState
 from golem.skills.base import StageFailed
 from golem.skills.context import Context
 from golem.skills.force_guard import ForceGuard
+from golem.skills.hand_offset import shift_of
 from golem.skills.pick_config import PickConfig, PickFailed, PickOutcome, PickReport, Sight, slipped
-from golem.skills.pick_targets import Attempt, HandReach, PickChoice, positions, shift_of
+from golem.skills.pick_targets import Attempt, HandReach, PickChoice, positions
 from golem.skills.poses import lifted, moved, turned
 from golem.skills.travel import Travel
 from golem.types import Array

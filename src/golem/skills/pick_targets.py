@@ -20,7 +20,7 @@ from golem.skills.pick_config import PickConfig, PickFailed, PickGoal, PickOutco
 from golem.skills.planned_motion import PlannedMotion
 from golem.skills.poses import counts_at, floor_places, stands_at
 from golem.skills.stance_choice import seen_from
-from golem.types import SIDES, Array, LocalizedObject, Side
+from golem.types import SIDES, Array, Detection, LocalizedObject, Side
 
 BRIM = 0.01
 """What is this far outside of the rim may still lie inside [m]: as much is the depth off."""
@@ -36,8 +36,6 @@ TALL = 0.02
 """What stands higher than this above the floor is wall [m]."""
 APART = 0.03
 """Distance between two places that are tried [m]."""
-SURE = 0.02
-"""Up to here a difference along a row is no mistaken neighbour [m]; screws stand 9 cm apart."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,30 +93,6 @@ class Container:
             if all(np.linalg.norm(place - one) > APART for one in chosen):
                 chosen.append(place)
         return np.array(chosen)
-
-
-def shift_of(seen: Array, expected: Array, others: Array) -> Array:
-    """Return by how much a hand misses what the head camera shows, to send it elsewhere by the same.
-
-    Head camera and encoders are off by centimetres, and the palm camera tells by how much at the object that was
-    taken. What looks alike in a row may be mistaken for its neighbour. So what the difference has in the direction
-    of the nearest of `others` counts only up to `SURE`.
-
-    Args:
-        seen: (3,) where the palm camera saw the object, in odom [m].
-        expected: (3,) where the head camera did.
-        others: (n, 3) where the head camera saw such objects, this one included.
-    """
-    shift = seen - expected
-    away = others - expected
-    distance = np.linalg.norm(away, axis=1)
-    apart = distance > 1e-6
-    if not apart.any():
-        return shift
-    k = int(np.argmin(np.where(apart, distance, np.inf)))
-    direction = away[k] / distance[k]
-    along = float(shift @ direction)
-    return shift - along * direction if abs(along) > SURE else shift
 
 
 AROUND: Array = np.array([[0.0, 0.0, 0.0], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]], float)
@@ -269,6 +243,8 @@ class TargetChoice:
         blind = view.problem is not None and view.problem.outcome is PickOutcome.FAILED
         if not blind and not self._enough(goal, view) and self._config.turn > 0.0:
             view = await self._look_around(context, goal, view)
+        if view.problem is not None and view.problem.outcome is PickOutcome.NOTHING_THERE and goal.level:
+            view = self._added(context, goal, view, _as_listed(context.t, goal))
         if view.problem is not None:
             raise view.problem
         assert view.container is not None  # it would be the problem
@@ -384,6 +360,13 @@ class TargetChoice:
         """Return whether an object looks as if it were screwed down; the head camera is not sure of it."""
         height = height_above_ground(o)
         return height is not None and height < self._config.proud
+
+
+def _as_listed(t: float, goal: PickGoal) -> Detections:
+    """Return what is wanted as if it were seen where it is listed: a hand looks better at what is low and near."""
+    position, nowhere = np.array([*goal.wanted[:2], goal.level[0]]), np.zeros(2)
+    there = LocalizedObject(Detection(goal.label, 0.0, np.zeros(4), nowhere), t, position, position[None])
+    return Detections(t, "head", (there,))
 
 
 def _missing(outcome: PickOutcome, what: str) -> PickFailed:

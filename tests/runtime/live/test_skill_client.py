@@ -74,7 +74,7 @@ def test_the_stack_on_the_domain_says_what_a_goal_consists_of(waving: Live) -> N
     assert (goal.skill, json.loads(goal.goal)) == (
         "pick",
         {"label": "bolt", "container": "tray", "side": "left"}
-        | {"avoid": [], "wanted": [], "level": [], "container_at": [], "off": []},
+        | {"avoid": [], "wanted": [], "level": [], "container_at": [], "off": [], "landmarks": []},
     )
     goal = say(waving, "wave", "5")
     assert (goal.skill, json.loads(goal.goal)) == ("wave", {"times": 5})

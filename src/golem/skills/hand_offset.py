@@ -1,0 +1,80 @@
+"""By how much a palm camera sees things elsewhere than the head camera: from all that both see, not from one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from golem.skills.context import Context
+from golem.types import Array, Side
+
+FARTHEST: Array = np.array([0.1, 0.1, 0.05])
+"""Farthest that a palm camera may be off along x, y, z [m]: each camera is off by centimetres."""
+SPREAD = 0.01
+"""How well one look agrees with a list, turned by what the head camera is off by [m]."""
+LIKELY = 0.15
+"""An offset this large costs half a thing that agrees [m]."""
+CLEAR = 0.4
+"""By how many things that agree an offset must be better than every other one."""
+APART = 0.02
+"""Offsets this far apart are others [m]."""
+LOOK = 1.0
+"""Time for one look [s]."""
+SURE = 0.02
+"""Up to here a difference along a row is no mistaken neighbour [m]; screws stand 9 cm apart."""
+
+
+async def learn_offset(context: Context, side: Side, names: Sequence[str], known: Array) -> Array | None:
+    """Look down with a hand; return its `hand_offset` against `known` (n, 3), where the head camera has a list."""
+    with context.watch(f"{side}_hand", *names, doubtful=tuple(names)) as eye:
+        sightings = await eye.look(LOOK)
+    seen = [one.position for one in sightings.objects if one.label in names] if sightings else []
+    return hand_offset(np.array(seen).reshape(-1, 3), known)
+
+
+def hand_offset(seen: Array, known: Array) -> Array | None:
+    """Return (3,) by how much `seen` (m, 3) is elsewhere than `known` (n, 3), in odom [m]; None where that is unclear.
+
+    Fasteners stand nearer to each other than a camera is off, so one alone may be its neighbour. The offset counts by
+    which the most of what is seen falls on what is known; it is unclear by less than two, or where another offset does
+    as well, as in a regular row.
+    """
+    offsets = (seen[:, None] - known[None]).reshape(-1, 3)
+    offsets = offsets[(np.abs(offsets) <= FARTHEST).all(axis=1)]
+    if len(seen) < 2 or not len(offsets):
+        return None
+    left = seen[None, :, None] - offsets[:, None, None] - known[None, None]
+    away = np.linalg.norm(left, axis=3).min(axis=2)
+    scores = np.exp(-0.5 * (away / SPREAD) ** 2).sum(axis=1) - 0.5 * (np.linalg.norm(offsets, axis=1) / LIKELY) ** 2
+    best = int(scores.argmax())
+    others = scores[np.linalg.norm(offsets - offsets[best], axis=1) > APART]
+    agree = away[best] < 2.0 * SPREAD
+    if agree.sum() < 2 or (len(others) and others.max() > scores[best] - CLEAR):
+        return None
+    nearest = np.linalg.norm(left[best], axis=2).argmin(axis=1)
+    return (seen - known[nearest])[agree].mean(axis=0)
+
+
+def shift_of(seen: Array, expected: Array, others: Array) -> Array:
+    """Return by how much a hand misses what the head camera shows, to send it elsewhere by the same.
+
+    Head camera and encoders are off by centimetres, and the palm camera tells by how much at the object that was
+    taken. What looks alike in a row may be mistaken for its neighbour. So what the difference has in the direction
+    of the nearest of `others` counts only up to `SURE`.
+
+    Args:
+        seen: (3,) where the palm camera saw the object, in odom [m].
+        expected: (3,) where the head camera did.
+        others: (n, 3) where the head camera saw such objects, this one included.
+    """
+    shift = seen - expected
+    away = others - expected
+    distance = np.linalg.norm(away, axis=1)
+    apart = distance > 1e-6
+    if not apart.any():
+        return shift
+    k = int(np.argmin(np.where(apart, distance, np.inf)))
+    direction = away[k] / distance[k]
+    along = float(shift @ direction)
+    return shift - along * direction if abs(along) > SURE else shift
