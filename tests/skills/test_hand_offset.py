@@ -24,7 +24,8 @@ def test_what_several_agree_on_is_the_offset(off: tuple[float, float, float]) ->
 
 def test_one_more_that_only_the_hand_sees_does_not_matter() -> None:
     seen = np.vstack([EDGE[[1, 3, 4]] + (0.03, 0.02, 0.0), [(0.2, 0.1, 0.0)]])
-    assert np.allclose(hand_offset(seen, EDGE), (0.03, 0.02, 0.0))
+    found = hand_offset(seen, EDGE)
+    assert found is not None and np.allclose(found, (0.03, 0.02, 0.0))
 
 
 @pytest.mark.parametrize("seen", [EDGE[:0], EDGE[:1], EDGE[:3] + (0.3, 0.0, 0.0)])
@@ -37,7 +38,8 @@ def test_a_left_hand_before_the_ledge_of_a_real_pack() -> None:
     pack = Ioniq5Layout().fasteners()
     known = pack[[7, 8, 9, 10, 11, 75, 76]] + (0.947, 0.077, -0.082)
     seen = np.array([(0.913, 0.379, -0.107), (0.876, 0.444, -0.168), (0.92, 0.286, -0.111)])
-    assert np.allclose(hand_offset(seen, known), (-0.048, -0.022, -0.025), atol=1e-3)
+    found = hand_offset(seen, known)
+    assert found is not None and np.allclose(found, (-0.048, -0.022, -0.025), atol=1e-3)
 
 
 def test_nothing_known_is_unclear() -> None:

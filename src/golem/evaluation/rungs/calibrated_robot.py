@@ -17,16 +17,19 @@ from golem.evaluation.base import DONE, Rung, TrialOutcome, TrialSpec
 from golem.evaluation.blame.oracles import with_modules
 from golem.evaluation.episodes.episode import episode_seed
 from golem.evaluation.rungs.pick_screw import SLOT, PickOptions, PickRung
+from golem.output_file import write_file
 from golem.provenance import stack_facts
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.sensors.calibration import Calibration, LidarMount, point_moved, read_calibration
 from golem.robots.sensors.mid360 import draw_mount
 from golem.runtime.calibrate_command import lidar_stack
 from golem.runtime.lockstep import build, build_robot
-from golem.skills.base import SkillResult
+from golem.skills.base import SkillResult, StageFailed
 from golem.stack import Stack, load_stack
 from golem.types import SIDES, Array
 
+VIEWS = 16
+"""Postures of each hand, by default."""
 HAND_SKILL = "calibrate_hands"
 HAND_AHEAD = 0.1
 """Distance along the optical axis at which a palm camera is judged [m], as in the realism profiles."""
@@ -43,22 +46,29 @@ def judge_hands(stack: Stack, seed: int, head: Calibration, views: int, method: 
     """Calibrate the palm cameras of a robot whose head was calibrated, and judge them."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "calibration.json"
-        head.save(file)
-        corrected = stack.with_part("calibration", file=str(file)).with_skill(HAND_SKILL, folder=folder)
-        running, robot = build(corrected, seed)
-        with closing(robot):
-            goal = {"file": file.name, "views": views, "zero": float(head.joint_sigma.max())}
-            result = running.execute(HAND_SKILL, goal)
-            names = [f"{side}_hand" for side in SIDES]
-            before = max(point_moved(robot.calibration[name], HAND_AHEAD) for name in names)
+        result, true = calibrate_hands(stack, seed, head, views, file)
         if not result.success:
             return _failed(result)
         found = read_calibration(file)
+    names = [f"{side}_hand" for side in SIDES]
+    before = max(point_moved(true[name], HAND_AHEAD) for name in names)
     after = max(found.moved(name, HAND_AHEAD) for name in names)
     deviation = max(found.moved_sigma(name, HAND_AHEAD) for name in names)
     words = f"Palm cameras {before * 1e3:.1f} -> {after * 1e3:.2f} mm at 0.1 m."
     series = {"before": before, "after": after, "sigma": deviation}
     return _fitted(after <= HAND_GOOD, method, words, series, result.timings)
+
+
+def calibrate_hands(
+    stack: Stack, seed: int, head: Calibration, views: int, file: Path
+) -> tuple[SkillResult, Mapping[str, Array]]:
+    """Write `head` and what the palm cameras are off by to `file`; return how it went, and the true errors."""
+    head.save(file)
+    corrected = stack.with_part("calibration", file=str(file)).with_skill(HAND_SKILL, folder=str(file.parent))
+    running, robot = build(corrected, seed)
+    with closing(robot):
+        goal = {"file": file.name, "views": views, "zero": float(head.joint_sigma.max())}
+        return running.execute(HAND_SKILL, goal), robot.calibration
 
 
 def judge_lidar(stack: Stack, seed: int, head: Calibration, method: str) -> TrialOutcome:
@@ -121,7 +131,7 @@ class CalibrationOptions:
 
     what: tuple[Literal["head", "hand", "lidar"], ...] = ("head",)
     """head; or hand, the palm cameras, or lidar, of a robot whose head was calibrated."""
-    views: int = 16
+    views: int = VIEWS
     """Postures of each hand."""
     keep: str = ""
     """Folder in which calibrations are kept, by profile and episode, and from which they are taken where they are."""
@@ -131,7 +141,7 @@ class CalibrationOptions:
 class CalibratedPickOptions(PickOptions):
     """The work place, and how the robot was calibrated."""
 
-    views: int = 16
+    views: int = VIEWS
     """Postures of each hand."""
     keep: str = ""
     """Folder in which calibrations are kept, by profile and episode, and from which they are taken where they are."""
@@ -221,6 +231,26 @@ def calibrate(stack: Stack, seed: int, views: int, keep: str = "") -> Calibratio
         with closing(robot):
             result = running.execute(SKILL, {"file": file.name, "views": views})
         return read_calibration(file) if result.success else result
+
+
+def calibrated(stack: Stack, seed: int, keep: str) -> Stack:
+    """Return a stack whose robot was calibrated by its tags, head, encoders and palm cameras; files stay in `keep`.
+
+    Raises:
+        StageFailed: calibrating failed.
+    """
+    tagged, file = tagged_stack(stack.profile, {}), Path(keep) / f"{stack.profile}-all-{seed}.json"
+    if not file.is_file():
+        file.parent.mkdir(parents=True, exist_ok=True)
+        found = calibrate(tagged, seed, VIEWS, keep)
+        with tempfile.TemporaryDirectory() as folder:
+            draft = Path(folder) / file.name
+            if isinstance(found, Calibration):
+                found, _ = calibrate_hands(tagged, seed, found, VIEWS, draft)
+            if not found.success:
+                raise StageFailed(found.stage, found.slot or SKILL, found.reason)
+            write_file(file, draft.read_text(encoding="utf-8"))
+    return stack.with_part("calibration", file=str(file.resolve()))
 
 
 def tagged_stack(profile: str, overrides: Mapping[str, str]) -> Stack:

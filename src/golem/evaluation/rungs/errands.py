@@ -21,7 +21,9 @@ from golem.agent.tool_rules import Rules
 from golem.errors import unknown_name
 from golem.evaluation.base import DONE, Case, Results, TrialSpec
 from golem.evaluation.episodes.counter_watch import LIFTED, CounterWatch, ErrandWatch
+from golem.evaluation.episodes.episode import episode_seed
 from golem.evaluation.episodes.oracle import Oracle, whereabouts
+from golem.evaluation.rungs.calibrated_robot import calibrated
 from golem.evaluation.rungs.counter import ACROSS, AREA, FREE, LOOK, TIGHT, radius
 from golem.evaluation.rungs.kitchen_rung import Errand, KitchenRung, Verdict
 from golem.evaluation.rungs.pick_screw import SLOT, doable
@@ -56,6 +58,8 @@ class ErrandsOptions:
     """nominal or varied; see the rungs `counter-tether` and `tether`."""
     errand: tuple[str, ...] = ()
     """Names of errands, such as k01; none: all."""
+    calibrated: str = ""
+    """Folder of calibrations; see the rung `pack`."""
 
 
 class Asked:
@@ -135,11 +139,15 @@ class ErrandsRung(KitchenRung[ErrandsOptions]):
 
     def arranged(self, spec: TrialSpec, stack: Stack) -> Stack:
         """Return the stack of one errand; see `KitchenRung`."""
+        if self.options.calibrated:
+            stack = calibrated(stack, episode_seed(spec.seed, spec.index), self.options.calibrated)
         own = SUITE[str(spec.case["errand"])].get("stack")
         if own is None:
             return stack
         chosen = load_stack(own, profile=spec.profile).with_options("robot", layout=self.options.layout)
-        return replace(chosen, choices={**chosen.choices, "memory": stack.choice("memory")})
+        kept = {name: part for name, part in stack.parts.items() if name == "calibration"}
+        choices = {**chosen.choices, "memory": stack.choice("memory")}
+        return replace(chosen, choices=choices, parts={**chosen.parts, **kept})
 
     def errand(
         self, spec: TrialSpec, running: LockstepRunner, robot: MujocoRobot, kitchen: KitchenLayout, oracle: Oracle

@@ -19,6 +19,7 @@ from golem.evaluation.episodes.gantry_cell import GantryCell
 from golem.evaluation.episodes.oracle import ContactWatch, Oracle, Whereabouts, whereabouts
 from golem.evaluation.episodes.pick_watch import PickTouches
 from golem.evaluation.metrics.text_table import TextTable
+from golem.evaluation.rungs.calibrated_robot import calibrated
 from golem.evaluation.rungs.pick_screw import SETTLE
 from golem.evaluation.rungs.var_stand import STILL, VarStandRung
 from golem.robots.mujoco.scene import Scene
@@ -72,6 +73,8 @@ class WholePackOptions:
     """Deviation of a place in the list along each axis [m]."""
     kind: float = 0.0
     """Share of the fasteners that the list calls by another class."""
+    calibrated: str = ""
+    """Folder of calibrations: the robot is calibrated first, by `calibrate` and `calibrate_hands`; empty: it is not."""
     gantry: bool = False
     """Whether the gantry works beside the robot, a fastener in 20 s, and has not been there before."""
 
@@ -101,8 +104,10 @@ class WholePackRung(VarStandRung):
             "robot", layout=self.options.layout, conditions=dict(spec.case), stance=[AWAY, 0.0, 0.0],
             world=self.options.world, obstacles=0, reach_y=REACH_Y, gantry=self.options.gantry,
         )  # fmt: skip
-        folder = TemporaryDirectory()
-        with folder, closing(Episode(stack, episode_seed(spec.seed, spec.index), self.onlooker)) as episode:
+        folder, seed = TemporaryDirectory(), episode_seed(spec.seed, spec.index)
+        if self.options.calibrated:
+            stack = calibrated(stack, seed, self.options.calibrated)
+        with folder, closing(Episode(stack, seed, self.onlooker)) as episode:
             scene, robot = episode.robot.scene, episode.robot
             part = asked_for(scene.layout, self.options)
             claims = write_claims(Path(folder.name) / "pack.csv", scene, self.options, spec.rng("claims"))
