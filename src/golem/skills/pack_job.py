@@ -303,7 +303,7 @@ class PackJob:
         a, b = matched(known + (*shift, 0.0), np.column_stack([places, heights]), WANTED)
         if not len(a):
             return
-        self._rim, a, b = SeenRim.of(a[:, :2], b[:, 2] - a[:, 2]), a[:, :2], b[:, :2]
+        self._rim, a, b = self._rim.seen(a[:, :2], b[:, 2] - a[:, 2]), a[:, :2], b[:, :2]
         moved, _ = fit_frames(a - shift, b)
         if len(a) < 4 or float(np.ptp(a, axis=0).max()) < LONG:
             x, y = (b - a + shift).mean(axis=0).tolist()

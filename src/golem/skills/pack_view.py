@@ -192,8 +192,11 @@ def matched(known: Array, seen: Array, within: float) -> tuple[Array, Array]:
     return known[mine[good]], seen[good]
 
 
-STIFF = 0.02
-"""Spread of places from which on a slope is believed, in sums of squares [m^2]: a row tells none across it."""
+STIFF = 0.05
+"""Spread of places from which on a new slope is believed, in sums of squares [m^2]: a row tells none across it."""
+ROUGH, ROUNDS = 0.005, 8
+"""Heights this near to the rim count fully [m], those of mistaken neighbours on another level hardly, after so many
+rounds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -210,13 +213,20 @@ class SeenRim:
     middle: Array = field(default_factory=lambda: np.zeros(2))
     slope: Array = field(default_factory=lambda: np.zeros(2))
 
-    @classmethod
-    def of(cls, places: Array, heights: Array) -> SeenRim:
-        """Return the rim whose `heights` (n,) [m] were seen at (n, 2) `places` in the pack frame [m], n >= 1."""
-        height, middle = float(np.median(heights)), places.mean(axis=0)
+    def seen(self, places: Array, heights: Array) -> SeenRim:
+        """Return the rim whose `heights` (n,) [m] were seen at (n, 2) `places` in the pack frame [m], n >= 1.
+
+        Few places leave the slope as it was. The fit is one of absolute values, by weights.
+        """
+        height, middle, slope = float(np.median(heights)), places.mean(axis=0), self.slope
         off = places - middle
-        slope = np.linalg.solve(off.T @ off + np.eye(2) * STIFF, off.T @ (heights - height))
-        return cls(height, middle, slope)
+        for _ in range(ROUNDS):
+            left = heights - height - off @ slope
+            weights = ROUGH / np.maximum(np.abs(left), ROUGH)
+            height += float(weights @ left / weights.sum())
+            left, spread = heights - height - off @ self.slope, off.T * weights
+            slope = self.slope + np.linalg.solve(spread @ off + np.eye(2) * STIFF, spread @ left)
+        return SeenRim(height, middle, slope)
 
     def at(self, place: Array) -> float:
         """Return the height at (2,) or (3,) `place` [m]."""
