@@ -176,8 +176,7 @@ class SentencePlanner:
 def replay(file: Path, use: Use) -> Iterator[tuple[str, bool, bool]]:
     """Have the calls of a recorded session made again, in order; yield each tool, whether it succeeded, then and now.
 
-    Raises:
-        ConfigError: the log cannot be read, or was changed.
+    Raises ConfigError: the log cannot be read, or was changed.
     """
     entries = read_audit(file)
     ends = {(e["session"], e["number"]): e for e in entries if e["event"] in ("answer", "refuse")}

@@ -80,16 +80,13 @@ class LiveView(AbstractContextManager["LiveView", None]):
         restarts: bool = False,
         passive: bool = False,
     ) -> None:
-        """Start serving.
+        """Start serving. Raises ConfigError: the port cannot be had.
 
         Args:
             port: TCP port; 0 takes a free one.
             host: address to listen at; the default is reachable from this machine only, any other asks for a token.
             restarts: whether there is a button to start over, which makes `operate` return.
             passive: whether somebody else drives the robot, and this shows every tick of it.
-
-        Raises:
-            ConfigError: the port cannot be had.
         """
         local = is_loopback(host)
         self._server = serve(host, port) if local else serve("127.0.0.1", 0)

@@ -171,12 +171,10 @@ class Rung(ABC, Generic[O]):
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
         """Return everything but options, case, seed and index that determines a trial, as JSON-like data.
 
-        That is the resolved stack (a user's file by its content, not its name), world and profile. Its hash goes
-        into each record, and a run is only continued where the hash is the same.
-
-        Raises:
-            golem.errors.GolemError: an override names no slot or no implementation, or something this rung needs
-                is absent from this machine. It is called before anything is written.
+        That is the resolved stack (a user's file by its content, not its name), world and profile. Its hash goes into
+        each record, and a run is only continued where the hash is the same. Raises golem.errors.GolemError: an override
+        names no slot or no implementation, or something this rung needs is absent from this machine. It is called
+        before anything is written.
         """
 
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
@@ -228,8 +226,7 @@ def rung_class(name: str) -> type[Rung[Any]]:
 def make_rung(target: str, options: Mapping[str, Any] | None = None) -> Rung[Any]:
     """Import and make the rung at `target`, a `module:Class`, with its `options` by name.
 
-    Raises:
-        golem.errors.ConfigError: an option is wrong.
+    Raises golem.errors.ConfigError: an option is wrong.
     """
     kind = _load(target)
     return kind(fill(f"option of rung {kind.name}", kind.Options, options or {}))

@@ -61,8 +61,7 @@ class Lens:
 def to_lens(message: CameraInfo, name: str, near: float, far: float, rate: float) -> Lens:
     """Return the lens that a CameraInfo describes; the arguments are those of `to_camera`.
 
-    Raises:
-        CodecError: see `to_camera`, or the distortion's model is unknown, or has not its coefficients.
+    Raises CodecError: see `to_camera`, or the distortion's model is unknown, or has not its coefficients.
     """
     camera = to_camera(message, name, near, far, rate)
     if not message.d.any():
@@ -171,9 +170,7 @@ def to_camera(message: CameraInfo, name: str, near: float, far: float, rate: flo
 
     ROS says nothing of its name, depth range [m] and rate [Hz]. Region and binning are counted as by image_geometry
     (ros-perception/vision_opencv, pinhole_camera_model): K is that of the whole image, both of 0 are no region, 0 is 1.
-
-    Raises:
-        CodecError: a focal length is not positive, a number is not finite, K is skewed, or the region is outside.
+    Raises CodecError: a focal length is not positive, a number is not finite, K is skewed, or the region is outside.
     """
     fx, skew, cx, low, fy, cy = message.k[:6].tolist()
     finite = bool(np.isfinite([fx, fy, cx, cy]).all())
@@ -231,8 +228,7 @@ def point_cloud(t: float, points: NDArray[Any], frame: str) -> PointCloud2:
 def to_points(message: PointCloud2) -> NDArray[Any]:
     """Return the points of a cloud as a structured array (height * width,) with the cloud's fields.
 
-    Raises:
-        CodecError: the cloud's fields or sizes contradict each other.
+    Raises CodecError: the cloud's fields or sizes contradict each other.
     """
     order = ">" if message.is_bigendian else "<"
     kinds = {number: kind for kind, number in _POINT_TYPES.items()}

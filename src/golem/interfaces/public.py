@@ -64,8 +64,7 @@ STICKS = (0.6, 0.3, 0.8)
 def decode_arm_sdk(payload: Payload) -> ArmSdkCommand:
     """Return what a `LowCmd_` on `/arm_sdk` wants; modes do not count, and a checksum of 0 is none, as in examples.
 
-    Raises:
-        WireError: the length or a checksum is wrong, or a value is not finite.
+    Raises WireError: the length or a checksum is wrong, or a value is not finite.
     """
     image = hg.LOW_CMD.read(payload)
     if image["crc"] and not hg.COMMAND_CHECKSUM.holds(payload):

@@ -131,8 +131,7 @@ def decode_int(payload: str) -> int:
 def decode_velocity(payload: str) -> tuple[tuple[float, float, float], float]:
     """Return vx, vy [m/s], wz [rad/s] and their duration [s] from a payload.
 
-    Raises:
-        ValueError: it has no such numbers, one is not finite, or the duration is negative.
+    Raises ValueError: it has no such numbers, one is not finite, or the duration is negative.
     """
     values = decode(payload)
     velocity, duration = values.get("velocity"), values.get("duration")

@@ -65,10 +65,8 @@ class Bus:
     def publish(self, topic: Topic[T], value: T, t: float, latency: float = 0.0) -> None:
         """Send `value` on `topic` at time `t`; readers see it from `t + latency` on [s].
 
-        Values of one topic are delivered in the order they were published.
-
-        Raises:
-            WrongType: the value is not of the topic's kind.
+        Values of one topic are delivered in the order they were published. Raises WrongType: the value is not of the
+        topic's kind.
         """
         # Without a call of `isinstance` or `get`: nothing runs as often as this.
         if type(value) is not topic.kind and not isinstance(value, topic.kind):

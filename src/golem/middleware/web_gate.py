@@ -144,8 +144,7 @@ class _Waiting:
     def read(self, connection: socket.socket) -> bytes | None:
         """Read on, or take a new connection where it is the listener; return the head once it is whole.
 
-        Raises:
-            OSError: the listener is closed.
+        Raises OSError: the listener is closed.
         """
         if connection is self._listener:
             try:

@@ -38,7 +38,6 @@ class Robot(Protocol):
             hands: command of each hand.
             dt: time to advance [s].
         """
-        ...
 
     def joints(self) -> tuple[Array, Array, Array]:
         """Return q [rad], dq [rad/s] and tau [N m], each (27,), as the motors report them."""
@@ -63,7 +62,6 @@ class Robot(Protocol):
 
     def close(self) -> None:
         """Release what the robot holds: rendering contexts, connections. Closing twice does nothing."""
-        ...
 
 
 @runtime_checkable
@@ -88,7 +86,6 @@ class HasGantry(Protocol):
 
     def release(self) -> None:
         """Let the band go, smoothly; an operator's act. Without a band it does nothing."""
-        ...
 
 
 @runtime_checkable
@@ -118,12 +115,9 @@ class HasLidar(Protocol):
     """A robot with a LiDAR on its torso."""
 
     def lidar(self, t: float) -> tuple[list[LidarImu], LidarScan | None]:
-        """Return the IMU's samples since the last call and the scan that has arrived, if one has.
+        """Return the IMU's samples since the last call and the scan that has arrived, if one has. `t`: time [s].
 
         Called once per tick, or every `lidar_period` [s] where the robot has an attribute of that name.
-
-        Args:
-            t: time [s].
         """
         ...
 
@@ -138,7 +132,6 @@ class Restorable(Robot, Protocol):
 
     def restore_state(self, save_state: bytes) -> None:
         """Be in the moment of a snapshot: `capture` then shows what it showed there."""
-        ...
 
 
 @runtime_checkable
@@ -155,8 +148,6 @@ class HasStages(Protocol):
 
     def keep_moment(self, t: float) -> None:
         """Keep the moment `t` [s] for sensors that are read later, as the stage that senses does: Python has sensed."""
-        ...
 
     def take_hand_command(self, side: Side, command: HandCommand) -> None:
         """Take the command of one hand for the ticks that stages let pass."""
-        ...

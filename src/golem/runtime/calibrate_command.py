@@ -51,8 +51,7 @@ def lidar_stack(stack: Stack) -> Stack:
 def run_calibrate(config: CalibrateConfig) -> bool:
     """Calibrate and print what was found; return whether it succeeded.
 
-    Raises:
-        ConfigError: the stack file or an option is wrong, or the head's calibration is not there yet.
+    Raises ConfigError: the stack file or an option is wrong, or the head's calibration is not there yet.
     """
     stack = load_stack(config.stack, profile=config.profile)
     file, goal = Path(config.file), dict[str, Any](file=Path(config.file).name)

@@ -80,8 +80,7 @@ class ContractCheck:
     def satisfies(self, module: object, contract: type[Any]) -> None:
         """Check that `module` has every member of the protocol `contract`, and methods that take its arguments.
 
-        Raises:
-            ModuleFault: it lacks some, or a method takes other arguments; names them.
+        Raises ModuleFault: it lacks some, or a method takes other arguments; names them.
         """
         members = {**contract.__annotations__, **vars(contract)}
         lacking = [name for name in members if not name.startswith("_") and not hasattr(module, name)]

@@ -34,7 +34,6 @@ class Node(Protocol):
 
     def step(self, t: float) -> None:
         """Read the bus, run the module once at time `t` [s], publish what it returns."""
-        ...
 
 
 class Chain(Protocol):
@@ -52,7 +51,6 @@ class Chain(Protocol):
 
     def run(self, t: float, first: int, last: int) -> None:
         """Let the members from `first` up to `last` have their turns of the tick at `t` [s]."""
-        ...
 
     def run_ticks(self, tick: int, offset: float, ticks: int) -> int:
         """Let all members have their turns of up to so many ticks.
@@ -147,15 +145,12 @@ class Executor:
     """Drives nodes in the given order on one clock."""
 
     def __init__(self, bus: Bus, nodes: Sequence[Node], start: float = 0.0, chain: Chain | None = None) -> None:
-        """Schedule `nodes`, which exchange messages over `bus`.
+        """Schedule `nodes`, which exchange messages over `bus`. Raises ConfigError: a node is faster than the clock.
 
         Args:
             nodes: in the order of their turns.
             start: a time that is to be a tick [s]; a clock from outside need not start at a multiple of one.
             chain: some of the nodes, which then run as a chain.
-
-        Raises:
-            ConfigError: a node is faster than the clock.
         """
         self._bus, self._chain = bus, chain
         links = {} if chain is None else {id(node): i for i, node in enumerate(chain.members)}

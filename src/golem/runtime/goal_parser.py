@@ -21,15 +21,12 @@ def parse_goal(spec: SkillSpec, words: list[str], prog: str, taken: Collection[s
     """Return the fields of the goal that `words` say; a mistake in them is said, and ends the program.
 
     As in a call of Python, the first words may be values in the order of the fields, before others follow by name:
-    `1 -0.5 --frame odom`.
+    `1 -0.5 --frame odom`. Raises ConfigError: a field is called as an option of the command.
 
     Args:
         words: the rest of the command line.
         prog: what stands before them, for the help.
         taken: options that the command itself has.
-
-    Raises:
-        ConfigError: a field is called as an option of the command.
     """
     properties: dict[str, Schema] = spec.goal["properties"]
     for name in properties:
@@ -42,8 +39,7 @@ def parse_goal(spec: SkillSpec, words: list[str], prog: str, taken: Collection[s
 def read_fields(spec: SkillSpec, fields: Mapping[str, object]) -> dict[str, Any]:
     """Return all fields of a goal of a skill that are said by whomever, with its defaults.
 
-    Raises:
-        ConfigError: one does not exist, is missing, has the wrong type, or is out of its range or far too much.
+    Raises ConfigError: one does not exist, is missing, has the wrong type, or is out of its range or far too much.
     """
     goal = plain(read_goal(spec.name, _dataclass(spec.name, spec.goal), fields))
     for name, of in spec.goal["properties"].items():

@@ -204,8 +204,7 @@ def build_robot(stack: Stack, seed: int) -> Any:
 def build(stack: Stack, seed: int, limits: SafetyLimits | None = None) -> tuple[LockstepRunner, Any]:
     """Return `stack` running for episode `seed`, and its robot: for evaluation and viewers alone; see `LockstepRunner`.
 
-    Raises:
-        ConfigError, ModuleFault: see `build_robot`; so for every other module.
+    Raises ConfigError, ModuleFault: see `build_robot`; so for every other module.
     """
     robot = build_robot(stack, seed)
     return LockstepRunner(stack, robot, limits), robot

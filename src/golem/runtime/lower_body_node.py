@@ -46,8 +46,7 @@ class CheckedLowerBody:
     def check(self, command: object) -> LegCommand:
         """Return the `command` that the controller returned.
 
-        Raises:
-            ModuleFault: it is none, not finite, or leaves the torque of a robot on the ground to the servo.
+        Raises ModuleFault: it is none, not finite, or leaves the torque of a robot on the ground to the servo.
         """
         checked = command
         if type(checked) is not LegCommand:

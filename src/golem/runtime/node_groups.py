@@ -89,16 +89,13 @@ class RobotNodes:
         lidar_wanted: Callable[[], bool] | None,
         joint_offset: Array | None = None,
     ) -> None:
-        """Connect `robot` to `bus`.
+        """Connect `robot` to `bus`. Raises ConfigError, ModuleFault: see `ModuleFactory.make`; about the on-board legs.
 
         Args:
             wanted: called with the name of a camera, returns what says whether it is to be exposed; None where that
                 is another process's business.
             lidar_wanted: says whether anybody listens to the LiDAR; None where nobody ever does.
             joint_offset: (27,) reported minus true joint positions by calibration [rad]; None believes them.
-
-        Raises:
-            ConfigError, ModuleFault: see `ModuleFactory.make`; about the on-board legs.
         """
         contract = ContractCheck("robot", stack.choice("robot").use)
         self.act = robot_nodes.ActNode(bus, robot, contract, joint_offset)

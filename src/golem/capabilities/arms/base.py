@@ -54,7 +54,6 @@ class UpperBody(Protocol):
         Raises:
             TargetError: `q` has another shape or is not finite.
         """
-        ...
 
     def step(self, targets_left: Array | None, targets_right: Array | None, q_measured: Array, dt: float) -> ArmCommand:
         """Advance the command state by one tick.
@@ -81,7 +80,6 @@ class HasWaist(Protocol):
 
     def turn_waist(self, angle: float | None) -> None:
         """Prefer `angle` [rad] for the waist where the hands leave it free; None is the controller's own."""
-        ...
 
 
 def check_pose(name: str, pose: Array) -> Array:
@@ -108,11 +106,7 @@ def check_pose(name: str, pose: Array) -> Array:
 
 
 def check_joints(name: str, q: Array) -> Array:
-    """Return `q` as a (27,) float64 array.
-
-    Raises:
-        TargetError: wrong shape or not finite.
-    """
+    """Return `q` as a (27,) float64 array. Raises TargetError: wrong shape or not finite."""
     values = np.asarray(q, dtype=np.float64)
     if values.shape != (NUM_JOINTS,):
         raise TargetError(f"{name} must have shape ({NUM_JOINTS},), one value per motor, not {values.shape}.")
@@ -123,10 +117,6 @@ def check_joints(name: str, q: Array) -> Array:
 
 
 def check_dt(dt: float) -> None:
-    """Refuse a time step that is not a positive, finite number of seconds.
-
-    Raises:
-        TargetError: it is not.
-    """
+    """Refuse a time step that is not a positive, finite number of seconds. Raises TargetError: it is not."""
     if not 0.0 < dt < float("inf"):
         raise TargetError(f"dt must be a positive number of seconds, not {dt}.")

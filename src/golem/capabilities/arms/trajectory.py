@@ -70,11 +70,8 @@ class TrajectoryFollower:
     def step(self, t: float, dt: float) -> ArmCommand:
         """Return the targets at time `t` [s], `dt` [s] after the previous ones; after the end those of the end.
 
-        A target that position or velocity limits put out of reach is approached as fast as they allow; the command
-        is then `limited`.
-
-        Raises:
-            TargetError: `dt` is not positive.
+        A target that position or velocity limits put out of reach is approached as fast as they allow; the command is
+        then `limited`. Raises TargetError: `dt` is not positive.
         """
         check_dt(dt)
         wanted = self._at(t - self._t)
@@ -99,9 +96,8 @@ def gate_limits() -> tuple[Array, Array, Array]:
 def check_trajectory(trajectory: JointTrajectory, q: Array) -> None:
     """Check that arms whose joints are at `q` (15,) [rad] can follow `trajectory`.
 
-    Raises:
-        TargetError: shapes or times make no sense, a number is not finite, or a point is beyond the position limits,
-            too fast to get to, or, due at once, not where the arms are.
+    Raises TargetError: shapes or times make no sense, a number is not finite, or a point is beyond the position limits,
+    too fast to get to, or, due at once, not where the arms are.
     """
     times, points, velocities = trajectory.times, trajectory.q, trajectory.dq
     n = len(times)

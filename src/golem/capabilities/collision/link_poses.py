@@ -88,9 +88,7 @@ def joint_names(links: Sequence[LinkGeometry]) -> list[str]:
 
 def joint_value(link: LinkGeometry, q: Mapping[str, float]) -> float:
     """Return the position of a link's joint [rad or m] where the free joints are at `q`; those not named are at 0."""
-    if link.leader:
-        return link.ratio * q.get(link.leader, 0.0) + link.offset
-    return q.get(link.joint, 0.0)
+    return link.ratio * q.get(link.leader, 0.0) + link.offset if link.leader else q.get(link.joint, 0.0)
 
 
 def link_poses(links: Sequence[LinkGeometry], q: Array) -> Array:

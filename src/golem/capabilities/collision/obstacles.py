@@ -142,9 +142,7 @@ def cloud_grid(points: Points, cell: float = 0.02, spheres: Array = NOTHING, mar
 def cleared(grid: CloudGrid, spheres: Array, margin: float) -> CloudGrid:
     """Return the grid without the cells that are nearer than `margin` [m] to `spheres` (m, 4)."""
     balls, cells = _away(grid.balls, grid.cells, spheres, margin)
-    if balls is grid.balls:
-        return grid
-    return CloudGrid(balls, cells, cell_steps(cells), grid.frame, grid.dropped)
+    return grid if balls is grid.balls else CloudGrid(balls, cells, cell_steps(cells), grid.frame, grid.dropped)
 
 
 def _away(balls: Array, cells: Cells, spheres: Array, margin: float) -> tuple[Array, Cells]:

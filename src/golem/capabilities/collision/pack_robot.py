@@ -22,14 +22,8 @@ from rich.console import Console
 from rich.table import Table
 from tqdm import tqdm
 
-from golem.capabilities.collision.link_poses import (
-    MeshOracle,
-    free_links,
-    hold_joints,
-    joint_names,
-    link_poses,
-    neighbours,
-)
+from golem.capabilities.collision import link_poses
+from golem.capabilities.collision.link_poses import free_links, hold_joints, joint_names, neighbours
 from golem.capabilities.collision.packing_report import CollisionScore, LinkCoverage, coverage, score_collisions
 from golem.capabilities.collision.sphere_packer import Packing, SphereKind, pack
 from golem.capabilities.collision.sphere_robot import SphereRobot, save_spheres, without_surfaces
@@ -96,8 +90,8 @@ def find_pairs(links: Sequence[LinkGeometry], packings: Sequence[Packing], postu
     every: NDArray[np.int64] = np.array([p for p in combinations(solid, 2) if p not in apart], np.int64)
     every = every.reshape(-1, 2)
     assert postures.shape[1] == len(joint_names(links))
-    poses = np.array([link_poses(links, q) for q in postures])
-    oracle = MeshOracle(links, every)
+    poses = np.array([link_poses.link_poses(links, q) for q in postures])
+    oracle = link_poses.MeshOracle(links, every)
     touching = np.array([oracle.touching(q) for q in _bar("postures", postures)])
     first = np.cumsum([0, *(len(p.radii) for p in packings)])
     centres = [
@@ -197,8 +191,7 @@ class PackedRobot:
 def run_spheres(config: SpheresConfig) -> PackedRobot:
     """Pack, print the report and write the file.
 
-    Raises:
-        ConfigError: a number is out of range, or the file cannot be read or has no geometry.
+    Raises ConfigError: a number is out of range, or the file cannot be read or has no geometry.
     """
     if config.file is None:
         name, links = our_robot()
@@ -215,14 +208,11 @@ def run_spheres(config: SpheresConfig) -> PackedRobot:
 
 
 def pack_robot(name: str, links: tuple[LinkGeometry, ...], config: SpheresConfig) -> PackedRobot:
-    """Pack the links of a robot.
+    """Pack the links of a robot. Raises ConfigError: a number is out of range, or a mesh is not finite.
 
     Args:
         links: with surfaces.
         config: how; `file` and `out` are not looked at.
-
-    Raises:
-        ConfigError: a number is out of range, or a mesh is not finite.
     """
     solid = [i for i, link in enumerate(links) if link.parts]
     if config.spheres < LEAST * len(solid):

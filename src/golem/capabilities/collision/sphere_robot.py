@@ -120,15 +120,13 @@ def shipped_spheres() -> SphereRobot:
 def holding(robot: SphereRobot, hand: str, held: Packing, name: str = "held") -> SphereRobot:
     """Return the robot with an object in its hand, as a link that moves with it.
 
-    The object is tested against what the hand is tested against, so not against the fingers.
+    The object is tested against what the hand is tested against, so not against the fingers. Raises ConfigError: no
+    such link, or the name is one already.
 
     Args:
         robot: with empty hands.
         hand: name of the link that holds.
         held: spheres of the object in the frame of that link.
-
-    Raises:
-        ConfigError: no such link, or the name is one already.
     """
     names = [link.name for link in robot.links]
     if hand not in names:

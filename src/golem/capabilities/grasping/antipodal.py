@@ -17,18 +17,11 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from golem.capabilities.grasping import object_cloud
 from golem.capabilities.grasping.base import Grasp, Gripper, OpenLoop
 from golem.capabilities.grasping.centroid import ACROSS, UP
 from golem.capabilities.grasping.hand_view import collides, in_hands
-from golem.capabilities.grasping.object_cloud import (
-    MIN_POINTS,
-    across,
-    fullest,
-    normals_of,
-    object_points,
-    spaced,
-    thinned,
-)
+from golem.capabilities.grasping.object_cloud import MIN_POINTS, across, fullest, object_points, spaced, thinned
 from golem.capabilities.grasping.rims import THIN, outline, rim_pairs
 from golem.finite import check_finite
 from golem.options import require
@@ -156,7 +149,7 @@ class Antipodal(OpenLoop):
         """
         c = self.config
         rng = np.random.default_rng(c.seed)
-        normals, smooth = normals_of(cloud)
+        normals, smooth = object_cloud.normals_of(cloud)
         usable = np.flatnonzero(smooth)
         if len(usable) < 2:
             usable = np.arange(len(cloud))

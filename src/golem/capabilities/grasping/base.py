@@ -141,7 +141,6 @@ class SeeingLaw(ServoLaw, Protocol):
             observe: returns what there is to be seen, by the names of a data set; None while something is missing.
             live: whether time passes by itself, so that nobody may wait here.
         """
-        ...
 
 
 class GraspMethod(Protocol):

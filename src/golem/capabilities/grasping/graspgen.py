@@ -71,8 +71,7 @@ class GraspGen(OpenLoop):
     def __init__(self, config: GraspGenConfig | None = None) -> None:
         """Take the options; the server is asked when a grasp is.
 
-        Raises:
-            MissingExtra: the packages it speaks through are not installed.
+        Raises MissingExtra: the packages it speaks through are not installed.
         """
         self.config = config or GraspGenConfig()
         self.latency = self.config.latency
@@ -81,8 +80,7 @@ class GraspGen(OpenLoop):
     def propose(self, target: LocalizedObject, scene: Array, gripper: Gripper) -> list[Grasp]:
         """Return the server's grasps that come along the wanted approach; see `GraspMethod`.
 
-        Raises:
-            ServiceUnavailable: the server is not there, takes too long, refuses, or answers nonsense.
+        Raises ServiceUnavailable: the server is not there, takes too long, refuses, or answers nonsense.
         """
         check_finite("the object's position", target.position)
         c = self.config
@@ -105,8 +103,7 @@ class GraspGen(OpenLoop):
     def ask(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """Return the server's answer to one request.
 
-        Raises:
-            ServiceUnavailable: there is none in time, it is an error, or no map.
+        Raises ServiceUnavailable: there is none in time, it is an error, or no map.
         """
         zmq, msgpack = _packages()
         c = self.config
@@ -141,8 +138,7 @@ class GraspGen(OpenLoop):
     def _grasps(self, answer: Mapping[str, Any]) -> tuple[Array, Array]:
         """Return the poses (n, 4, 4) and confidences (n,) of an answer.
 
-        Raises:
-            ServiceUnavailable: they are not there, or no poses.
+        Raises ServiceUnavailable: they are not there, or no poses.
         """
         where = f"The GraspGen server at {self.config.host}:{self.config.port} sent"
         try:
@@ -183,8 +179,7 @@ def _pack_array(value: object) -> object:
 def _unpack_array(value: dict[Any, Any]) -> object:
     """Return the array that a map of msgpack-numpy holds; any other map as it is.
 
-    Raises:
-        ValueError: it is said to be an array and is none.
+    Raises ValueError: it is said to be an array and is none.
     """
     flag = value.get(b"nd", value.get("nd"))
     if flag is None:

@@ -59,11 +59,7 @@ class PolicyLaw:
             self._shut = self._shut + 1 if action[GRIPS][k] < self._shut_below else 0
 
     def step(self, t: float, sightings: list[LocalizedObject] | None, T_odom_gripper: Array) -> ServoStep:
-        """Go where the policy said last; see `ServoLaw`.
-
-        Raises:
-            ActionRefused: that is nowhere near the hand.
-        """
+        """Go where the policy said last; see `ServoLaw`. Raises ActionRefused: that is nowhere near the hand."""
         T = T_odom_gripper if self._goal is None else self._goal
         check_near(T, T_odom_gripper, FAR)
         status = ServoStatus.CONVERGED if self._shut >= AGREED else ServoStatus.TRACKING

@@ -96,11 +96,7 @@ class Reranking:
     """
 
     def __init__(self, config: RerankingConfig | None = None) -> None:
-        """Make the proposer.
-
-        Raises:
-            ConfigError, ModuleFault: it cannot be made; see `registry.create`.
-        """
+        """Make the proposer. Raises ConfigError, ModuleFault: it cannot be made; see `registry.create`."""
         self.config = c = config or RerankingConfig()
         if c.proposer.use == "reranked":
             raise ConfigError("Reranked grasps are not ranked again; choose another proposer.")

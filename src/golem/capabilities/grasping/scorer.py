@@ -57,8 +57,7 @@ class GraspNet:
 def load_net(path: Path) -> GraspNet:
     """Return the network of a file that `GraspNet.save` wrote.
 
-    Raises:
-        ConfigError: it cannot be read, is no such file, or is of another network.
+    Raises ConfigError: it cannot be read, is no such file, or is of another network.
     """
     try:
         with np.load(path, allow_pickle=False) as file:
@@ -111,11 +110,7 @@ class Scorer(OpenLoop):
     """
 
     def __init__(self, config: ScorerConfig | None = None) -> None:
-        """Load the network.
-
-        Raises:
-            ConfigError: the weights cannot be read, or are of another network.
-        """
+        """Load the network. Raises ConfigError: the weights cannot be read, or are of another network."""
         self.config = config or ScorerConfig()
         self._proposer = Antipodal(self.config.proposer)
         self._net = load_net(SHIPPED if self.config.weights is None else Path(self.config.weights).expanduser())

@@ -120,7 +120,6 @@ class LowerBody(Protocol):
 
     def reset(self, state: LowState) -> None:
         """Start from the measured `state`; whatever the controller remembered is forgotten."""
-        ...
 
     def step(self, state: LowState, base: BaseEstimate, motion: LocomotionCommand, dt: float) -> LegCommand:
         """Advance by one tick.

@@ -77,9 +77,7 @@ class GaitConfig:
 
     def without_commands(self) -> GaitConfig:
         """Return the same clock for a controller that is to follow no twist."""
-        if not self.follows:
-            return self
-        return replace(self, start="balance" if self.recovers else "never")
+        return replace(self, start="balance" if self.recovers else "never") if self.follows else self
 
 
 GAIT = np.dtype([("phase", "f8"), ("idle", "f8"), ("stepping", "?")], align=True)

@@ -127,13 +127,10 @@ class Handover:
     """
 
     def __init__(self, config: HandoverConfig, onboard: Onboard | None = None) -> None:
-        """Make both controllers.
+        """Make both controllers. Raises ConfigError, ModuleFault: one of them cannot be made; see `registry.create`.
 
         Args:
             onboard: the robot's own computer, for a controller that speaks to it.
-
-        Raises:
-            ConfigError, ModuleFault: one of them cannot be made; see `registry.create`.
         """
         self.config = config
         parts = (config.walk, config.stand)

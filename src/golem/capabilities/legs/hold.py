@@ -43,8 +43,7 @@ def squat(height: float) -> Array:
 def standing(own: float, heights: tuple[float, float] | None) -> Envelope:
     """Return the envelope of legs that stand at their `own` height, or at any of `heights`, lowest and highest [m].
 
-    Raises:
-        ConfigError: no robot stands so; see `Envelope`.
+    Raises ConfigError: no robot stands so; see `Envelope`.
     """
     return Envelope() if heights is None else Envelope(height=(min(heights[0], own), own, max(heights[1], own)))
 

@@ -22,7 +22,6 @@ class Network(Protocol):
 
     def reset(self) -> None:
         """Forget everything."""
-        ...
 
     def __call__(self, observation: Float32) -> Float32:
         """Return the (12,) action, or a longer one, for an observation (n,)."""

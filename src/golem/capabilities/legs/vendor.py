@@ -41,7 +41,6 @@ class Onboard(Protocol):
 
     def send(self, service: str, request: ApiRequest) -> None:
         """Send `request` to `service`."""
-        ...
 
     def receive(self, service: str) -> Response | None:
         """Return the newest response of `service` if it came since the last call, else None."""
@@ -131,9 +130,8 @@ class Vendor:
     def step(self, state: LowState, base: BaseEstimate, motion: LocomotionCommand, dt: float) -> LegCommand:
         """Go on with the session; return what the on-board controller tells the legs. See `LowerBody.step`.
 
-        Raises:
-            VendorFault: a call was not answered in time or was refused, or the twist is not finite. The session is
-                over until `reset`.
+        Raises VendorFault: a call was not answered in time or was refused, or the twist is not finite. The session is
+        over until `reset`.
         """
         if self._fault is not None:
             raise self._fault

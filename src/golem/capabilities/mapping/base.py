@@ -28,11 +28,9 @@ class Mapper(Protocol):
 
     def reset(self) -> None:
         """Forget what was seen in this run."""
-        ...
 
     def add_scan(self, scan: Scan) -> None:
         """Take one scan, at 10 Hz."""
-        ...
 
     def grid(self) -> OccupancyGrid | None:
         """Return the map of the floor as it is now, its origin in odom; None while there is none."""

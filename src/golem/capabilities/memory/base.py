@@ -81,11 +81,9 @@ class Memory(Protocol):
     def observe(self, observation: Observation) -> None:
         """Take a look in. What was observed is kept when this returns.
 
-        Raises:
-            MemoryFault: the look is older than the last one, its pose or an object is not finite, or it cannot be
-                kept. The memory is as it was.
+        Raises MemoryFault: the look is older than the last one, its pose or an object is not finite, or it cannot be
+        kept. The memory is as it was.
         """
-        ...
 
     def query(self, text: str, when: When = "now", at: float | None = None, limit: int = 5) -> list[Place]:
         """Return the places that answer best, best first; none where nothing is remembered of it.
@@ -107,7 +105,6 @@ class Memory(Protocol):
 
     def close(self) -> None:
         """Let go of files; nothing is asked or observed afterwards."""
-        ...
 
 
 @runtime_checkable
@@ -131,14 +128,11 @@ def apart(places: Iterable[Place], spread: float, limit: int) -> list[Place]:
 
 
 def check_observation(observation: Observation, last: float) -> None:
-    """Refuse a look that no memory can take.
+    """Refuse a look that no memory can take. Raises MemoryFault: see `Memory.observe`.
 
     Args:
         observation: the look.
         last: time of the one before [s].
-
-    Raises:
-        MemoryFault: see `Memory.observe`.
     """
     frame = observation.frame
     if not np.isfinite(frame.t):

@@ -13,20 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
+from golem.capabilities.memory import memory_file
 from golem.capabilities.memory.base import Evidence, Observation, Place, When, check_observation, check_query
-from golem.capabilities.memory.memory_file import (
-    BELIEF,
-    EVIDENCE,
-    FIRST,
-    GONE,
-    LAST,
-    LOOKS,
-    PLACE,
-    SIZE,
-    VARIANCE,
-    MemoryFile,
-    ObjectRecords,
-)
+from golem.capabilities.memory.memory_file import BELIEF, EVIDENCE, FIRST, GONE, LAST, LOOKS, PLACE, SIZE, VARIANCE
 from golem.capabilities.memory.words import label_scores
 from golem.capabilities.perception.lift import standing_middle
 from golem.errors import ConfigError
@@ -135,7 +124,7 @@ def size_of(found: LocalizedObject) -> float:
     return float(np.clip(1.5 * spread, 0.02, LARGEST))
 
 
-def outvoted(records: ObjectRecords, row: int, gate: float, tie: float) -> bool:
+def outvoted(records: memory_file.ObjectRecords, row: int, gate: float, tie: float) -> bool:
     """Return whether the object of a row is rather another kind's, at whose place it is.
 
     Two bodies cannot be in one place: a detector that names them by turns has one of them before it. It is of the kind
@@ -150,7 +139,7 @@ def outvoted(records: ObjectRecords, row: int, gate: float, tie: float) -> bool:
     return len(rivals) > 0 and bool(np.any(values[rivals, EVIDENCE] > values[row, EVIDENCE] + tie))
 
 
-def _rivals(records: ObjectRecords, row: int, gate: float) -> NDArray[np.intp]:
+def _rivals(records: memory_file.ObjectRecords, row: int, gate: float) -> NDArray[np.intp]:
     """Return the rows of what may be the same body under another name.
 
     Their lives overlap, and so does the time in which they were seen, unless this one was seen once only: what was
@@ -223,14 +212,14 @@ class ObjectMap:
     def __init__(self, config: ObjectMapConfig | None = None) -> None:
         """Open the memory. Raises MemoryFault: the file cannot be used."""
         self._config = config or ObjectMapConfig()
-        self._records = ObjectRecords()
+        self._records = memory_file.ObjectRecords()
         self.last = -math.inf
-        self._file = None if self._config.file is None else MemoryFile(Path(self._config.file))
+        self._file = None if self._config.file is None else memory_file.MemoryFile(Path(self._config.file))
         if self._file is not None:
             self._read(self._file)
 
-    def _read(self, file: MemoryFile) -> None:
-        self._records = ObjectRecords()
+    def _read(self, file: memory_file.MemoryFile) -> None:
+        self._records = memory_file.ObjectRecords()
         rows, self.last = file.read()
         for row in rows:
             self._records.add(row.label, row.values, row.number)

@@ -194,7 +194,6 @@ class PlaceJudge(Protocol):
 
     def observe(self, observation: Observation) -> None:
         """Take a look in; see `Memory.observe`."""
-        ...
 
     def order(self, text: str, when: When, at: float | None, proposed: Sequence[Place], limit: int) -> list[Place]:
         """Return those of the proposed places that answer, with what is known of their times, best first."""
@@ -206,7 +205,6 @@ class PlaceJudge(Protocol):
 
     def close(self) -> None:
         """See `Memory.close`."""
-        ...
 
 
 class ObjectJudge:

@@ -46,7 +46,6 @@ class Navigator(Protocol):
 
     def start(self, goal: PlanarPose) -> None:
         """Pursue `goal`, in odom or map, from the next step on; of earlier ones counts what they taught about legs."""
-        ...
 
     def step(self, inputs: NavInputs, dt: float) -> NavStep:
         """Advance by one step.

@@ -28,7 +28,6 @@ class Behaviour(Protocol):
 
     def reset(self) -> None:
         """Begin again at the next tick."""
-        ...
 
 
 class Action:

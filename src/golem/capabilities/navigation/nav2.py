@@ -34,7 +34,6 @@ class Nav2Link(Protocol):
 
     def send(self, pose: PlanarPose) -> None:
         """Propose a goal, in the frame of the goal that the navigator pursues; it replaces the one before."""
-        ...
 
     def reply(self) -> Nav2Reply | None:
         """Return how the newest goal stands; None while nobody has said anything."""

@@ -61,23 +61,18 @@ class LidarOdometry(Protocol):
 
     def reset(self) -> None:
         """Forget everything: odom begins anew where the robot stands next."""
-        ...
 
     def add_imu(self, sample: LidarImu) -> None:
         """Take one sample of the IMU, at 200 Hz."""
-        ...
 
     def add_legs(self, legs: LegOdometry) -> None:
         """Take what the legs say, at 100 Hz; a robot may have none."""
-        ...
 
     def add_scan(self, scan: LidarScan) -> None:
         """Take one scan, at 10 Hz; it may arrive up to 0.2 s after its end."""
-        ...
 
     def add_external(self, odometry: ExternalOdometry) -> None:
         """Take what an odometry outside of this stack says, at any rate."""
-        ...
 
     def estimate(self) -> OdometryEstimate | None:
         """Return where the robot is; None before it is known, and while the method is lost."""

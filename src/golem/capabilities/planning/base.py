@@ -146,8 +146,7 @@ class ArmPlanner(Protocol):
     def plan(self, request: PlanRequest) -> Plan:
         """Return a trajectory from `request.q` to one of `request.goals`.
 
-        Raises:
-            PlanRefused: there is none; `refusal` says why.
+        Raises PlanRefused: there is none; `refusal` says why.
         """
         ...
 
@@ -155,8 +154,7 @@ class ArmPlanner(Protocol):
 def check_request(request: PlanRequest) -> tuple[Array, Array]:
     """Return `q` (15,) and `goals` (k, 15) of a request as arrays of float64.
 
-    Raises:
-        PlanRefused: a shape is wrong, a number is not finite, or a bound has no meaning.
+    Raises PlanRefused: a shape is wrong, a number is not finite, or a bound has no meaning.
     """
     q, goals = np.asarray(request.q, np.float64), np.asarray(request.goals, np.float64)
     if q.shape != (NUM_JOINTS,):

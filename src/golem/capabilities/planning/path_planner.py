@@ -194,10 +194,7 @@ class PathPlanner(ABC):
     ) -> Array:
         """Return the corners (k, 15), k >= 2, of a free path from `q` (15,) to one of `goals` (m, 15).
 
-        The path of an earlier `attempt` did not hold in fine steps; the first is 0.
-
-        Raises:
-            PlanRefused: none was found.
+        The path of an earlier `attempt` did not hold in fine steps; the first is 0. Raises PlanRefused: none was found.
         """
 
     def plan(self, request: PlanRequest) -> Plan:

@@ -73,8 +73,7 @@ class PolicyServer:
     def infer(self, observation: Mapping[str, Any]) -> Any:
         """Return the actions for an observation of arrays and words, as they came.
 
-        Raises:
-            ServiceUnavailable: the server is not there, takes too long, refuses, or answers nonsense.
+        Raises ServiceUnavailable: the server is not there, takes too long, refuses, or answers nonsense.
         """
         websockets, msgpack, _ = _packages()
         c, where = self._config, self._where
@@ -141,8 +140,7 @@ def pack_array(value: object) -> object:
 def unpack_array(value: dict[Any, Any]) -> object:
     """Return the array or number in a map of openpi_client.msgpack_numpy; any other map as it is.
 
-    Raises:
-        ValueError: it is said to be an array and is none.
+    Raises ValueError: it is said to be an array and is none.
     """
     if b"__npgeneric__" in value:
         return np.dtype(value[b"dtype"]).type(value[b"data"])

@@ -134,8 +134,7 @@ def palm_numbers(T: Array) -> Array:
 def palm_pose(numbers: Array) -> Array:
     """Return the (4, 4) pose of nine numbers, its rotation made one (Gram and Schmidt).
 
-    Raises:
-        ActionRefused: they are not finite, or their two columns are no two directions.
+    Raises ActionRefused: they are not finite, or their two columns are no two directions.
     """
     x, y = numbers[3:6], numbers[6:9]
     if not np.isfinite(numbers).all():

@@ -98,8 +98,7 @@ def candidate(slot: str, use: str) -> base.Candidate:
 def choice_of(use: str) -> tuple[str, Mapping[str, object]]:
     """Return name and options of a module as it is given on the command line.
 
-    Raises:
-        ConfigError: it begins with `{` and is not of the form `{use: NAME, option: value, ...}`.
+    Raises ConfigError: it begins with `{` and is not of the form `{use: NAME, option: value, ...}`.
     """
     if not use.startswith("{"):
         return use, {}

@@ -34,8 +34,7 @@ class RobotRig:
     def follow(self, path: Path, seconds: float) -> list[LowState]:
         """Send the joints along `path` with the gains of the servo; return the state of each tick, from time 0 on.
 
-        Raises:
-            Inapplicable: no command moves this robot.
+        Raises Inapplicable: no command moves this robot.
         """
         self._need_motion()
         begin, states = self._t, [self._state(0.0)]
@@ -56,8 +55,7 @@ class RobotRig:
     def grip(self, side: Side, gap: float, force: float, seconds: float) -> HandState:
         """Send one hand to an opening [m] with a ceiling on its force [N]; return what it reports `seconds` later.
 
-        Raises:
-            Inapplicable: no command moves this robot.
+        Raises Inapplicable: no command moves this robot.
         """
         self._need_motion()
         self._hands[side] = HandCommand(self._t, gap, force)

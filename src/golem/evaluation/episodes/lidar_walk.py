@@ -134,7 +134,7 @@ def record_walk(
     overrides: Mapping[str, str] | None = None,
     onlooker: Onlooker | None = None,
 ) -> LidarWalk:
-    """Let the robot walk a route, its arms moving.
+    """Let the robot walk a route, its arms moving. Raises ConfigError: a name is wrong.
 
     Args:
         seed: seed of all walks.
@@ -142,9 +142,6 @@ def record_walk(
         people: how many walk around it.
         overrides: stack slot -> implementation; the estimator is `ESTIMATOR` where it names none.
         onlooker: is shown the stack.
-
-    Raises:
-        ConfigError: a name is wrong.
     """
     if route not in ROUTES:
         raise ConfigError(f"There is no route '{route}'; choose from {', '.join(ROUTES)}.")
@@ -259,9 +256,7 @@ def range_and_bearing(track: PoseTrack) -> tuple[float, float] | None:
     None for a walk that ends where it began, whose end has no direction.
     """
     own, true = (complex(*T[-1, :2, 3]) for T in (track.T, track.true))
-    if abs(true) < 1.0 or not own:
-        return None
-    return abs(own) - abs(true), cmath.phase(own / true)
+    return None if abs(true) < 1.0 or not own else (abs(own) - abs(true), cmath.phase(own / true))
 
 
 def nees(track: PoseTrack, since: float) -> tuple[float, float] | None:

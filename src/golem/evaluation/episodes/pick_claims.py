@@ -115,6 +115,4 @@ def _one(tried: Tried, fasteners: Sequence[Fastener], in_tray: bool, looked: Arr
 def _nearest(place: Array, fasteners: Sequence[Fastener], within: float) -> Fastener | None:
     """Return the fastener nearest to a place, across, or None if none is `within` [m]."""
     away = [float(np.hypot(f.position[0] - place[0], f.position[1] - place[1])) for f in fasteners]
-    if not away or min(away) > within:
-        return None
-    return fasteners[int(np.argmin(away))]
+    return None if not away or min(away) > within else fasteners[int(np.argmin(away))]

@@ -44,8 +44,7 @@ _UP: Array = np.array([0.0, 0.0, 9.81])
 def plain_model(path: Path | None = None) -> mujoco.MjModel:
     """Return the robot on a floor, without hands: ours, or that of the MJCF file `path` with its own options.
 
-    Raises:
-        ConfigError: the file cannot be read, or holds no such robot.
+    Raises ConfigError: the file cannot be read, or holds no such robot.
     """
     if path is None:
         spec = mjcf.robot_spec(hands=False, self_collision=True)

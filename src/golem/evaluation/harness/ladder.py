@@ -226,8 +226,7 @@ def summed_up(config: LadderConfig, out: Path, records: tuple[TrialRecord, ...],
 def prepare(config: LadderConfig) -> tuple[Request, Provenance]:
     """Refuse what cannot run; return what a `whole` configuration asks for, and the provenance of its records.
 
-    Raises:
-        golem.errors.ConfigError: an option says nothing this software can do.
+    Raises golem.errors.ConfigError: an option says nothing this software can do.
     """
     n, profile = config.n or 0, config.profile or ""
     for option, value, minimum in (("-n", n, 1), ("-j", config.j, 1), ("--seed", config.seed, 0)):

@@ -166,8 +166,7 @@ def artefacts(folder: Path, trial: TrialSpec | TrialRecord) -> Path:
 def read_records(path: Path) -> list[TrialRecord]:
     """Return the records of a `trials.jsonl`; a last line that a kill tore off is left out.
 
-    Raises:
-        golem.errors.OutputError: another line is no trial record, or one that was there, or the file cannot be read.
+    Raises golem.errors.OutputError: another line is no trial record, or one that was there, or the file cannot be read.
     """
     try:
         text = path.read_bytes()

@@ -109,7 +109,6 @@ class TrialExecutor(Protocol):
 
     def submit(self, batch: Batch) -> None:
         """Add a batch; also while results are read."""
-        ...
 
     def results(self) -> Generator[tuple[Batch, Ending], None, None]:
         """Yield each batch and how it ended, until all have. Raises GolemError: nothing can run any more."""
@@ -117,7 +116,6 @@ class TrialExecutor(Protocol):
 
     def close(self) -> None:
         """End what is in flight, and every process that was started."""
-        ...
 
 
 def make_executor(where: str, processes: int) -> TrialExecutor:

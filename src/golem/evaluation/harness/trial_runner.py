@@ -172,8 +172,7 @@ class Runner:
     def run(self, held: Sequence[TrialRecord]) -> list[TrialRecord]:
         """Run what is wanted and not among `held`; return the records of all.
 
-        Raises:
-            golem.errors.GolemError: the rung refuses, or nothing can run any more; finished trials are kept.
+        Raises golem.errors.GolemError: the rung refuses, or nothing can run any more; finished trials are kept.
         """
         records = self.records = list(held)
         self._found = {record.key: record.outcome for record in held}

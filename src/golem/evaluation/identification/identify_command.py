@@ -136,8 +136,7 @@ class IdentifyConfig:
 def record_motion(stack: Stack, seed: int, bag: Path, seconds: float = 60.0) -> None:
     """Record the robot of `stack`, episode `seed`, while it swings its joints in an open world.
 
-    Raises:
-        ConfigError, ModuleFault, OutputError: see `build` and `BagWriter`; the gate has stopped the robot.
+    Raises ConfigError, ModuleFault, OutputError: see `build` and `BagWriter`; the gate has stopped the robot.
     """
     swinging = stack.with_choice("lower_body", f"{SWEEP}:LegSweep").with_choice("upper_body", f"{SWEEP}:ArmSweep")
     running, robot = build(swinging.with_options("robot", world="open"), seed)

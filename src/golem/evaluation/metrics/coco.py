@@ -155,11 +155,8 @@ def read_coco(folder: Path) -> list[LabelledImage]:
     Images are looked for beside the file, in the folder, and there in `images`, in the folder that the file is named
     after (`annotations/instances_val2017.json`: `val2017`) and in that of `images`. Annotations of images that are not
     listed are left out, as by pycocotools. Boxes with `iscrowd` or `ignore` are ignored. Class names are in small
-    letters, with `_` for a space.
-
-    Raises:
-        ConfigError: there is no such file, it is damaged, an image is absent, of another size or in two files, or a box
-            is not in its image.
+    letters, with `_` for a space. Raises ConfigError: there is no such file, it is damaged, an image is absent, of
+    another size or in two files, or a box is not in its image.
     """
     folder = folder.expanduser()
     files = coco_files(folder)

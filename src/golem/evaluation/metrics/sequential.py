@@ -11,16 +11,8 @@ import numpy as np
 from golem.errors import ConfigError
 from golem.evaluation.base import Case, TrialOutcome, case_name
 from golem.evaluation.harness.records import TrialRecord
-from golem.evaluation.metrics.anytime import (
-    ALPHA,
-    anytime_interval,
-    anytime_p,
-    bounded_interval,
-    confidence_sequence,
-    difference_interval,
-    equal_within,
-    evidence,
-)
+from golem.evaluation.metrics import anytime
+from golem.evaluation.metrics.anytime import anytime_interval, anytime_p, difference_interval, equal_within, evidence
 from golem.evaluation.metrics.statistics import Interval, holm, wilson
 from golem.evaluation.metrics.tables import p_value
 from golem.evaluation.metrics.text_table import TextTable, short_names
@@ -63,11 +55,11 @@ class StopRule:
 
         `paired` says that both saw the same scenes.
         """
-        alpha = ALPHA / self.comparisons
+        alpha = anytime.ALPHA / self.comparisons
         if not len(a):
             return None
         if b is None:
-            low, high = confidence_sequence(a, alpha)
+            low, high = anytime.confidence_sequence(a, alpha)
             done = high - low <= 2.0 * self.margin
         else:
             done = (anytime_p(evidence(a, b, paired)) <= alpha) | equal_within(a, b, self.margin, alpha)
@@ -196,13 +188,11 @@ def sequential_tables(rates: Mapping[str, Array], found: Sequence[Decision], rul
 
 
 def _fixed(x: Array) -> Interval:
-    if np.isin(x, (0.0, 1.0)).all():
-        return wilson(float(x.sum()), len(x))
-    return bounded_interval(x)
+    return wilson(float(x.sum()), len(x)) if np.isin(x, (0.0, 1.0)).all() else anytime.bounded_interval(x)
 
 
 def _verdict(d: Decision, rule: StopRule) -> str:
-    if d.p_holm <= ALPHA:
+    if d.p_holm <= anytime.ALPHA:
         verdict = f"{'first' if d.difference.low + d.difference.high > 0.0 else 'second'} is better"
     elif -rule.margin <= d.difference.low and d.difference.high <= rule.margin:
         verdict = "equal"

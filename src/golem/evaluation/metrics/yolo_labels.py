@@ -25,11 +25,8 @@ def read_yolo(folder: Path) -> list[LabelledImage]:
     The labels of `images/train/a.jpg` are `labels/train/a.txt`, those of `a.jpg` without such a folder are `a.txt`; an
     image without them shows nothing. Class names are those of `names` in the folder's one YAML file that has them, or
     the lines of `classes.txt`; they are told in small letters, with `_` for a space. Where the YAML file has a
-    `kpt_shape`, each box is followed by so many key points, which are left out.
-
-    Raises:
-        ConfigError: there are no images, no names, labels without an image, a box that is not in its image, or a file
-            is not in this format.
+    `kpt_shape`, each box is followed by so many key points, which are left out. Raises ConfigError: there are no
+    images, no names, labels without an image, a box that is not in its image, or a file is not in this format.
     """
     folder = folder.expanduser()
     classes = _classes(folder)

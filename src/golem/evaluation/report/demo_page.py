@@ -116,8 +116,7 @@ def balance_section(
 ) -> list[tuple[str, str, str]]:
     """Return title, words and plot of each part of the section on balance, with the `figures` of `balance_figures`.
 
-    Raises:
-        golem.errors.MissingExtra: what draws it is not installed.
+    Raises golem.errors.MissingExtra: what draws it is not installed.
     """
     work = trace.window(-math.inf, math.inf if pushed_at is None else pushed_at)
     steps = f"{figures['steps']:.0f} step{'' if figures['steps'] == 1 else 's'}"

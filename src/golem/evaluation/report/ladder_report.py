@@ -20,16 +20,8 @@ from golem.evaluation.metrics.summary import NO_MODULE, MethodSummary, Summary, 
 from golem.evaluation.metrics.tables import all_cases, comparisons, metric_differences, metrics, rates
 from golem.evaluation.metrics.text_table import short_names
 from golem.evaluation.report import margin_plot as margins
-from golem.evaluation.report.svg_figure import (
-    COLOUR,
-    cause_colour,
-    method_colour,
-    page_figure,
-    render_page,
-    standalone,
-    styled,
-    svg,
-)
+from golem.evaluation.report import svg_figure
+from golem.evaluation.report.svg_figure import COLOUR, cause_colour, method_colour, page_figure, styled, svg
 
 ROW = 34.0
 """Height of one row of a figure [px]."""
@@ -143,7 +135,7 @@ def standalone_figures(records: Sequence[TrialRecord]) -> dict[str, str]:
                 found |= {kind: failure_plot(summary, kind) for kind in ("stages", "modules")}
         times = dict.fromkeys(name for record in records for name in record.timings)
         found |= {name: time_plot(name, grouped) for name in times}
-    return {name: standalone(picture) for name, picture in found.items()}
+    return {name: svg_figure.standalone(picture) for name, picture in found.items()}
 
 
 def own_plot(rung: Any, outcomes: Mapping[str, Any]) -> tuple[str, str] | None:
@@ -170,7 +162,7 @@ def render(result: LadderResult) -> str:
     times = dict.fromkeys(name for r in records for name in r.timings)
     with styled():
         plots, boxes = _margins(grouped, result.out)
-        return render_page(
+        return svg_figure.render_page(
             "ladder.html",
             _provenance(result),
             rung=first.rung,

@@ -107,10 +107,7 @@ def margin_plot(curves: Sequence[MarginCurve], color: int) -> str:
         return ""
     pushed = any(curve.trace.force.any() for curve in shown)
     figure = page_figure(330.0 if pushed else 240.0)
-    if pushed:
-        above, axes = figure.subplots(2, sharex=True, height_ratios=(1, 2.6))
-    else:
-        above, axes = None, figure.subplots()
+    above, axes = figure.subplots(2, sharex=True, height_ratios=(1, 2.6)) if pushed else (None, figure.subplots())
     colour = method_colour(color)
     for i, curve in reversed(list(enumerate(shown))):
         start = push_start(curve.trace)

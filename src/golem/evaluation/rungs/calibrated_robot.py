@@ -236,8 +236,7 @@ def calibrate(stack: Stack, seed: int, views: int, keep: str = "") -> Calibratio
 def calibrated(stack: Stack, seed: int, keep: str) -> Stack:
     """Return a stack whose robot was calibrated by its tags, head, encoders and palm cameras; files stay in `keep`.
 
-    Raises:
-        StageFailed: calibrating failed.
+    Raises StageFailed: calibrating failed.
     """
     tagged, file = tagged_stack(stack.profile, {}), Path(keep) / f"{stack.profile}-all-{seed}.json"
     if not file.is_file():
@@ -256,8 +255,7 @@ def calibrated(stack: Stack, seed: int, keep: str) -> Stack:
 def tagged_stack(profile: str, overrides: Mapping[str, str]) -> Stack:
     """Return the stack whose robot wears the tags, in an empty hall: it is the same robot as at the pack.
 
-    Raises:
-        ConfigError: an override is wrong, or brings another robot.
+    Raises ConfigError: an override is wrong, or brings another robot.
     """
     stack = load_stack(STACK, profile=profile)
     stack = with_modules(stack, overrides)

@@ -167,10 +167,7 @@ def draw_errand(spec: TrialSpec, kitchen: KitchenLayout) -> tuple[str, Literal["
 
     The case names thing and hand where there is one. Else a thing and the hand on its side are drawn. Of the things
     that may be meant, the first is taken for which there is a place with room; where there is room for none, the last
-    one is to be set down again where it stood.
-
-    Raises:
-        ConfigError: nothing of the kind stands there.
+    one is to be set down again where it stood. Raises ConfigError: nothing of the kind stands there.
     """
     rng = spec.rng("errand")
     things = kitchen.things

@@ -57,11 +57,9 @@ class PushedEpisode(Protocol):
 
     def run(self, seconds: float, until: Callable[[], bool] = ...) -> None:
         """Let up to `seconds` of robot time pass."""
-        ...
 
     def push(self, push: Push) -> None:
         """Begin a push now."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)

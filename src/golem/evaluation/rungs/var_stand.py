@@ -240,9 +240,7 @@ class _Trial:
         if outcome.success or outcome.stage in ("fall", "safety", "fault"):
             return outcome
         stands_badly = not served or pick.outcome in NOWHERE_TO_WORK
-        if not stands_badly:
-            return outcome
-        return replace(outcome, stage="stance", module=self._who(found))
+        return replace(outcome, stage="stance", module=self._who(found)) if stands_badly else outcome
 
     def _who(self, found: DisassembleReport) -> str | None:
         """Return the module that put the robot where no hand gets to a screw."""

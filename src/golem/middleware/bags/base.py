@@ -59,11 +59,9 @@ class Sink(Protocol):
 
     def write(self, message: BagMessage) -> None:
         """Take one message. Raises OutputError: it cannot be written."""
-        ...
 
     def close(self) -> None:
         """Complete what was written; calling it again does nothing."""
-        ...
 
 
 def missing(error: ModuleNotFoundError) -> MissingExtra:

@@ -66,15 +66,10 @@ class Bag:
         return all(file.finished for file in self.files)
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[BagMessage]:
-        """Iterate over the messages in the order of their log times.
+        """Iterate over the messages in the order of their log times. `topics`: names of those to read; default: all.
 
-        A file without an index, e.g. one that was not finished, is read in the order in which it was written.
-
-        Args:
-            topics: names of those to read; default: all.
-
-        Raises:
-            BagError: the bag is damaged here.
+        A file without an index, e.g. one that was not finished, is read in the order in which it was written. Raises
+        BagError: the bag is damaged here.
         """
         for file in self.files:
             yield from file.messages(topics)

@@ -99,11 +99,8 @@ class Recorder:
     def poll(self, last: bool = False) -> int:
         """Pass on what has come, in the order in which it was written; return how many messages.
 
-        At first nothing is passed on until /clock or the wall clock is known to tell the domain's time, unless this
-        is the `last` time.
-
-        Raises:
-            OutputError: the sink cannot be written.
+        At first nothing is passed on until /clock or the wall clock is known to tell the domain's time, unless this is
+        the `last` time. Raises OutputError: the sink cannot be written.
         """
         now = self._wall()
         every = [(self._written(tick, now), tick) for tick in _take_all(self._ticks, MANY)]

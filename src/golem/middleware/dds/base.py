@@ -106,13 +106,10 @@ class Writer(Protocol):
     def write(self, payload: Payload) -> None:
         """Send one sample; `payload` may be changed once this returns.
 
-        Where a reliable reader is so far behind that much waits for it already, this waits up to 0.1 s, then drops
-        the sample and counts it in `dropped`: a stalled peer must not stop the robot's process.
-
-        Raises:
-            DdsError: it is no CDR, or the writer is closed.
+        Where a reliable reader is so far behind that much waits for it already, this waits up to 0.1 s, then drops the
+        sample and counts it in `dropped`: a stalled peer must not stop the robot's process. Raises DdsError: it is no
+        CDR, or the writer is closed.
         """
-        ...
 
     def matched(self) -> int:
         """Return how many readers match now."""
@@ -127,7 +124,6 @@ class Writer(Protocol):
 
     def close(self) -> None:
         """Leave the domain; calling it again does nothing."""
-        ...
 
 
 class Reader(Protocol):
@@ -144,8 +140,7 @@ class Reader(Protocol):
     def take(self, maximum: int = 64) -> list[Sample]:
         """Remove and return up to `maximum` samples, oldest first; none is an empty list.
 
-        Raises:
-            DdsError: the reader is closed.
+        Raises DdsError: the reader is closed.
         """
         ...
 
@@ -159,7 +154,6 @@ class Reader(Protocol):
 
     def close(self) -> None:
         """Leave the domain; calling it again does nothing."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,23 +176,20 @@ class Participant(Protocol):
     network: NetworkPlace | None
 
     def writer(self, topic: str, type_name: str, qos: Qos, user_data: str = "") -> Writer:
-        """Create a writer.
+        """Create a writer. Raises DdsError: this participant already uses `topic` with another type, or is closed.
 
         Args:
             topic: name of the topic as on the wire.
             type_name: name of its type as on the wire.
             qos: what it offers.
             user_data: USER_DATA that peers see during discovery.
-
-        Raises:
-            DdsError: this participant already uses `topic` with another type, or is closed.
         """
         ...
 
     def reader(
         self, topic: str, type_name: str, qos: Qos, user_data: str = "", on_data: Callable[[], None] | None = None
     ) -> Reader:
-        """Create a reader.
+        """Create a reader. Raises DdsError: as for a writer.
 
         Args:
             topic: name of the topic as on the wire.
@@ -208,12 +199,8 @@ class Participant(Protocol):
             on_data: called when there is something to take, one call at a time for all readers of the participant.
                 It must take, may write, and must not wait for another callback. The first call may come before this
                 method has returned; then it may leave the samples, and take them itself once it has the reader.
-
-        Raises:
-            DdsError: as for a writer.
         """
         ...
 
     def close(self) -> None:
         """Close every writer and reader and leave the domain; calling it again does nothing."""
-        ...

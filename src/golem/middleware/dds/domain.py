@@ -131,9 +131,8 @@ _lock = threading.Lock()
 def open_domain(library: Cyclone, config: DdsConfig) -> None:
     """Open a domain in this process, or use it once more if it is open. `close_domain` undoes it.
 
-    Raises:
-        DdsError: the interface is not there or cannot reach anybody, or the domain is open in this process with
-            another configuration.
+    Raises DdsError: the interface is not there or cannot reach anybody, or the domain is open in this process with
+    another configuration.
     """
     interface = find_interface(config.interface)
     if not (interface.loopback or interface.multicast or config.peers):

@@ -35,7 +35,6 @@ class Owner(Protocol):
 
     def forget(self, entity: int) -> None:
         """Take an endpoint that closes off the books."""
-        ...
 
 
 class _Endpoint:

@@ -48,8 +48,7 @@ def interfaces() -> list[Interface]:
 def find_interface(name: str) -> Interface:
     """Return an interface that is up; `lo` is the loopback interface, whatever it is called here.
 
-    Raises:
-        ConfigError: there is none of that name; the message lists those there are.
+    Raises ConfigError: there is none of that name; the message lists those there are.
     """
     known = interfaces()
     for interface in known:

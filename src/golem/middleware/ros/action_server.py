@@ -88,7 +88,6 @@ class ActionHandler(Protocol):
 
     def accepted(self, goal: ServerGoal) -> None:
         """Take charge of a goal; its client knows by now that it was accepted."""
-        ...
 
     def cancel(self, goal: ServerGoal) -> bool:
         """Return whether to agree that `goal` be canceled; if so it is canceling when this has returned."""

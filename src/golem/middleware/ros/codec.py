@@ -18,19 +18,8 @@ import numpy as np
 from golem.errors import unknown_name
 from golem.middleware.dds.base import Payload
 from golem.middleware.ros import definitions, msgs
-from golem.middleware.ros.message import (
-    ARRAY,
-    NAME,
-    SEQUENCE,
-    CodecError,
-    Definition,
-    Message,
-    is_numeric,
-    message_class,
-    numpy_name,
-    python_name,
-    short,
-)
+from golem.middleware.ros import message as messages
+from golem.middleware.ros.message import ARRAY, NAME, SEQUENCE, CodecError, Definition, Message, python_name
 
 DEFAULT_DISTRO = "jazzy"
 """Distribution of the functions of this module; where the distribution matters, use `codec`."""
@@ -111,10 +100,7 @@ class Codec:
     def message(self, name: str) -> type[Any]:
         """Return the class of a message, e.g. `"sensor_msgs/msg/Image"` or `"std_srvs/srv/SetBool_Request"`.
 
-        It is that of `golem.middleware.ros.msgs` where there is one.
-
-        Raises:
-            ConfigError: there is no such type.
+        It is that of `golem.middleware.ros.msgs` where there is one. Raises ConfigError: there is no such type.
         """
         if name not in self._classes:
             self._known(name)
@@ -124,7 +110,7 @@ class Codec:
                 if name not in self._classes:
                     definition = self._types[name]
                     kept = name in msgs.DEFINITIONS
-                    made = msgs.held(name) if kept else message_class(name, definition, self.message, __name__)
+                    made = msgs.held(name) if kept else messages.message_class(name, definition, self.message, __name__)
                     self._store.types[name] = cast(Any, made)
                     self._classes[name] = made
         return self._classes[name]
@@ -185,7 +171,7 @@ class Codec:
             return
         wrong = asked or name
         package = wrong.split("/")[0]
-        siblings = [each for each in self._types if each.startswith(f"{package}/") and "_" not in short(each)]
+        siblings = [each for each in self._types if each.startswith(f"{package}/") and "_" not in messages.short(each)]
         if siblings:
             raise unknown_name("ROS interface", wrong, siblings)
         raise unknown_name("ROS package", package, {each.split("/")[0] for each in self._types})
@@ -208,8 +194,8 @@ class Codec:
                 inner = self._check(element[1])
                 if inner is not None:
                     deeper.append((python_name(field), what != NAME, inner))
-            elif what in (ARRAY, SEQUENCE) and is_numeric(element):
-                arrays.append((python_name(field), np.dtype(getattr(np, numpy_name(element[1][0])))))
+            elif what in (ARRAY, SEQUENCE) and messages.is_numeric(element):
+                arrays.append((python_name(field), np.dtype(getattr(np, messages.numpy_name(element[1][0])))))
         if not arrays and not deeper:
             return None
 

@@ -41,21 +41,15 @@ def check_namespace(namespace: str) -> str:
 
 
 def resolve(name: str, node: str, namespace: str) -> str:
-    """Return the absolute name of a topic, service or action.
+    """Return the absolute name of a topic, service or action. Raises ConfigError: it is none of these.
 
     Args:
         name: absolute (`/a/b`), relative to the namespace (`a/b`), or private to the node (`~/a`).
-
-    Raises:
-        ConfigError: it is none of these.
     """
     root = "" if namespace == "/" else namespace
     if name.startswith("~/"):
         full = f"{root}/{node}/{name[2:]}"
-    elif name.startswith("/"):
-        full = name
-    else:
-        full = f"{root}/{name}"
+    full = name if name.startswith("/") else f"{root}/{name}"
     try:
         return _check("topic, service or action", full, MAX_TOPIC)
     except ConfigError as error:

@@ -77,7 +77,7 @@ class RosNode:
         now: Callable[[], float] = time.time,
         log: Callable[[str], None] = log_error,
     ) -> None:
-        """Join the ROS graph.
+        """Join the ROS graph. Raises ConfigError: name, namespace or distro is invalid.
 
         Args:
             participant: member of a DDS domain, with `graph.PARTICIPANT_USER_DATA`; closed by whoever made it.
@@ -86,9 +86,6 @@ class RosNode:
             distro: whose `ros2 node list` shall show the node: `"humble"`, or `"jazzy"` for all since.
             now: the clock that goals are stamped by [s].
             log: what callbacks raise is said by; see `CallbackGuard`.
-
-        Raises:
-            ConfigError: name, namespace or distro is invalid.
         """
         self.name, self.namespace, self.now = names.check_node(name), names.check_namespace(namespace), now
         self.guard = CallbackGuard(log)
@@ -100,8 +97,7 @@ class RosNode:
     def publisher(self, topic: str, type: str, qos: Qos = DEFAULT) -> Publisher:
         """Publish messages of `type` on `topic`.
 
-        Raises:
-            ConfigError: the name is invalid, or the type unknown; so for everything below.
+        Raises ConfigError: the name is invalid, or the type unknown; so for everything below.
         """
         return Publisher(self._endpoints, self._resolve(topic), type, qos)
 
@@ -146,8 +142,7 @@ class RosNode:
     def wait(self, future: Future[T], timeout: float) -> T:
         """Spin until `future` is done and return its value; after `timeout` [s] it is given up.
 
-        Raises:
-            RosError: it failed, or did not arrive in time.
+        Raises RosError: it failed, or did not arrive in time.
         """
         end = time.monotonic() + timeout
         while not future.done:

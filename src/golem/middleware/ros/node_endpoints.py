@@ -30,13 +30,10 @@ class DiscoveryInfo:
     """
 
     def __init__(self, participant: Participant, namespace: str, name: str, distro: str) -> None:
-        """Announce node `name` in `namespace`, without endpoints yet.
+        """Announce node `name` in `namespace`, without endpoints yet. Raises ConfigError: there is no such distro.
 
         Args:
             distro: `"humble"` for peers of that distribution, `"jazzy"` for all since.
-
-        Raises:
-            ConfigError: there is no such distro.
         """
         self._codec = codec.codec(distro)
         self._info, self._node, self._gid = (
@@ -73,11 +70,9 @@ class Attended(Protocol):
 
     def keep(self) -> None:
         """Do what is due."""
-        ...
 
     def close(self) -> None:
         """Stop."""
-        ...
 
 
 class Linked(NamedTuple):
@@ -117,16 +112,13 @@ class NodeEndpoints:
         return ".".join(f"{byte:x}" for byte in self._participant.guid[:12] + number.to_bytes(4, "big"))
 
     def writer(self, topic: str, type: str, qos: Qos, owner: str = "") -> Writer:
-        """Create a writer.
+        """Create a writer. Raises RosError: the node is closed.
 
         Args:
             topic: name on the wire.
             type: ROS name of its type.
             qos: what it offers.
             owner: `clientid=...;` or `serviceid=...;` of the client or server it belongs to.
-
-        Raises:
-            RosError: the node is closed.
         """
         self._check()
         writer = self._participant.writer(topic, codec.dds_name(type), qos, owner + _hash(type))

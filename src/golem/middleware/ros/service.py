@@ -67,13 +67,10 @@ class Client:
         return self._writer.matched() > 0 and self._inbox.matched() > 0
 
     def call(self, request: Any) -> Future[Any]:
-        """Send a request; the future brings the response.
+        """Send a request; the future brings the response. Raises CodecError: it is not of the service's type.
 
         It fails when no server is there or the server goes away; a server that does not answer is the caller's to
         give up on, with `RosNode.wait` or `Future.cancel`.
-
-        Raises:
-            CodecError: it is not of the service's type.
         """
         body = serialize(f"Service '{self.name}'", request, self._type.Request)
         self._sequence += 1

@@ -9,14 +9,11 @@ from golem.middleware.ros.message import CodecError
 
 
 def check(where: str, message: Any, kind: type[Any]) -> None:
-    """Raise unless `message` is a `kind`.
+    """Raise unless `message` is a `kind`. Raises CodecError: it is something else.
 
     Args:
         where: what prescribes it, e.g. `"Topic '/chatter'"`.
         kind: class of the messages that may be sent.
-
-    Raises:
-        CodecError: it is something else.
     """
     if not isinstance(message, kind):
         raise CodecError(f"{where} takes a {kind.__msgtype__} here, not {type(message).__name__}.")

@@ -87,8 +87,7 @@ Submessage = Data | Heartbeat | Gap | AckNack
 def parse(datagram: bytes, own: bytes) -> tuple[bytes, bytes, list[Submessage]]:
     """Return vendor id, guid prefix (12 bytes) and content of a datagram, less what is for other prefixes than `own`.
 
-    Raises:
-        ValueError: it is no RTPS message, or a malformed one.
+    Raises ValueError: it is no RTPS message, or a malformed one.
     """
     try:
         magic, version, vendor, prefix = HEADER.unpack_from(datagram)

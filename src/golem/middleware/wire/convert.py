@@ -57,9 +57,8 @@ def encode_low_state(state: LowState, mode_machine: int = MODE_MACHINE) -> bytes
 def decode_low_state(payload: Payload) -> LowState:
     """Return the state in a `LowState_`. Its time is the robot's tick, which starts again after 49.7 days.
 
-    Raises:
-        WireError: encapsulation, length or checksum is wrong, the ankles are not in pitch and roll, a value is not
-            finite, or the quaternion is none.
+    Raises WireError: encapsulation, length or checksum is wrong, the ankles are not in pitch and roll, a value is not
+    finite, or the quaternion is none.
     """
     _check(payload, hg.LOW_STATE, hg.STATE_CHECKSUM)
     mode_pr, tick, *inertial = hg.STATE_HEAD.unpack_from(payload)
@@ -81,10 +80,7 @@ def motor_columns(payload: Payload) -> tuple[Array, Array, Array, Array]:
     """Return modes (27,), error words (27,), temperatures (27, 2) [degrees] and voltages (27,) [V] of a `LowState_`.
 
     The vendor's low-level examples report a `motorstate` other than zero as an error with that code; what the codes
-    mean is not published.
-
-    Raises:
-        WireError: encapsulation or length is wrong.
+    mean is not published. Raises WireError: encapsulation or length is wrong.
     """
     image = hg.LOW_STATE.read(payload)
     motors = image["motor"][:NUM_JOINTS]

@@ -37,12 +37,9 @@ def structure(size: int, fields: Fields) -> np.dtype[np.void]:
 
 
 def check_encapsulation(payload: Payload, type_name: str) -> None:
-    """Check that `payload` begins as little-endian XCDR1 does.
+    """Check that `payload` begins as little-endian XCDR1 does. Raises WireError: it does not.
 
     The two option bytes are not looked at: Cyclone counts in them how many bytes it padded.
-
-    Raises:
-        WireError: it does not.
     """
     if bytes(payload[:2]) != ENCAPSULATION[:2]:
         raise WireError(
@@ -76,10 +73,8 @@ class StructLayout:
     def read(self, payload: Payload) -> Image:
         """Return the image that `payload` holds, as a view of it: what is written to it changes a `bytearray`.
 
-        Copies of the image lack what no field covers, the encapsulation for one.
-
-        Raises:
-            WireError: its encapsulation or its length is wrong.
+        Copies of the image lack what no field covers, the encapsulation for one. Raises WireError: its encapsulation or
+        its length is wrong.
         """
         self.check(payload)
         return np.frombuffer(payload, self.dtype, count=1).reshape(())

@@ -45,13 +45,9 @@ Key = tuple[int, str, str, Layers]
 
 
 def isaac_python(option: Path | None) -> Path:
-    """Return the Python of Isaac Lab's environment.
+    """Return the Python of Isaac Lab's environment. `option`: as the stack file names it; None: `VARIABLE` says it.
 
-    Args:
-        option: as the stack file names it; None: `VARIABLE` says it.
-
-    Raises:
-        MissingEnvironment: nobody names one, or there is none.
+    Raises MissingEnvironment: nobody names one, or there is none.
     """
     named = str(option) if option is not None else os.environ.get(VARIABLE, "")
     if not named:

@@ -11,14 +11,8 @@ import numpy as np
 from golem.errors import ConfigError
 from golem.robots.model.spatial import quat_to_axis
 from golem.robots.model.table import BASE_LINK
-from golem.robots.mujoco.other_engine import (
-    CONTACT_OFFSET,
-    FINGER_DRIVE,
-    POSITION_ITERATIONS,
-    VELOCITY_ITERATIONS,
-    follower_names,
-    touchable,
-)
+from golem.robots.mujoco import other_engine
+from golem.robots.mujoco.other_engine import CONTACT_OFFSET, FINGER_DRIVE, follower_names, touchable
 from golem.types import Array
 
 HEADER = """#usda 1.0
@@ -95,10 +89,8 @@ def robot_layer(model: mujoco.MjModel) -> str:
     """Return the robot of `model` as a USD layer: an articulation whose links and joints have the model's names.
 
     A joint has the model's damping as a drive of velocity, and its armature. Dry friction is not in it. A finger's
-    hinge has the drive `FINGER_DRIVE`.
-
-    Raises:
-        ConfigError: something else than the robot moves, or a shape has no counterpart.
+    hinge has the drive `FINGER_DRIVE`. Raises ConfigError: something else than the robot moves, or a shape has no
+    counterpart.
     """
     root = model.body(BASE_LINK).id
     mine = model.body_rootid == model.body_rootid[root]
@@ -110,8 +102,8 @@ def robot_layer(model: mujoco.MjModel) -> str:
         ("PhysicsArticulationRootAPI", "PhysxArticulationAPI"),
         {
             "bool physxArticulation:enabledSelfCollisions": "0",
-            "int physxArticulation:solverPositionIterationCount": str(POSITION_ITERATIONS),
-            "int physxArticulation:solverVelocityIterationCount": str(VELOCITY_ITERATIONS),
+            "int physxArticulation:solverPositionIterationCount": str(other_engine.POSITION_ITERATIONS),
+            "int physxArticulation:solverVelocityIterationCount": str(other_engine.VELOCITY_ITERATIONS),
             "float physxArticulation:sleepThreshold": "0",
             "float physxArticulation:stabilizationThreshold": "0",
         },
@@ -148,14 +140,11 @@ def robot_layer(model: mujoco.MjModel) -> str:
 
 
 def world_layer(model: mujoco.MjModel, friction: float) -> str:
-    """Return what of `model` stays where it is as a USD layer.
+    """Return what of `model` stays where it is as a USD layer. Raises ConfigError: a shape has no counterpart.
 
     Args:
         model: see `robot_layer`.
         friction: sliding friction of its surfaces.
-
-    Raises:
-        ConfigError: a shape has no counterpart.
     """
     place = mujoco.MjData(model)
     mujoco.mj_kinematics(model, place)

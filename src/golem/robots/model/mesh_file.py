@@ -72,8 +72,7 @@ def _in_package(package: str, path: str, file: Path, packages: Mapping[str, Path
 def package_folders(options: tuple[str, ...]) -> dict[str, Path]:
     """Return the folders of packages by name, of options such as `my_robot=/path/to/my_robot`.
 
-    Raises:
-        ConfigError: one is not of that form, or there is no such folder.
+    Raises ConfigError: one is not of that form, or there is no such folder.
     """
     found: dict[str, Path] = {}
     for option in options:
@@ -88,10 +87,8 @@ def package_folders(options: tuple[str, ...]) -> dict[str, Path]:
 def read_mesh(path: Path) -> tuple[Array, NDArray[np.int64]]:
     """Return vertices (n, 3) [m] and faces (m, 3) of a mesh file in a format of trimesh or Assimp, in one piece.
 
-    A COLLADA file's unit counts and its up axis does not, as in RViz.
-
-    Raises:
-        ConfigError: it holds no mesh, or Git LFS has not fetched it.
+    A COLLADA file's unit counts and its up axis does not, as in RViz. Raises ConfigError: it holds no mesh, or Git LFS
+    has not fetched it.
     """
     import trimesh  # 40 MB, which a robot that only runs does without
 

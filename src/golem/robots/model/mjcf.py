@@ -23,7 +23,7 @@ _FLIP: Array = np.diag([1.0, -1.0, -1.0])
 def robot_spec(
     hands: bool = True, torque: str = "urdf", *, self_collision: bool = False, feet: Feet = "spheres"
 ) -> mujoco.MjSpec:
-    """Return the robot without floor, light or options.
+    """Return the robot without floor, light or options. Raises ConfigError: unknown torque profile.
 
     Names: bodies as the links; free joint `base`; joints and motors as in the table, the 27 motors first and in motor
     order; per hand the body `{side}_hand` and per finger `{side}_{a|b}_crank`, `_finger` (body, hinge), `_pad` (geom)
@@ -35,9 +35,6 @@ def robot_spec(
         torque: profile of the torque limits, see `table.load_limits`.
         self_collision: legs, arms and trunk touch each other, see `contact_shapes.self_pairs`.
         feet: what the soles are to the floor.
-
-    Raises:
-        ConfigError: unknown torque profile.
     """
     limits = table.load_limits(torque)
     spec = mujoco.MjSpec()

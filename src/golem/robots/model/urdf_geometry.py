@@ -16,15 +16,8 @@ from scipy.spatial.transform import Rotation
 from tqdm import tqdm
 
 from golem.errors import ConfigError
-from golem.robots.model.link_geometry import (
-    GeometryChoice,
-    JointKind,
-    LinkGeometry,
-    RobotGeometry,
-    SurfacePart,
-    led,
-    with_surface,
-)
+from golem.robots.model import link_geometry
+from golem.robots.model.link_geometry import GeometryChoice, JointKind, LinkGeometry, RobotGeometry, SurfacePart
 from golem.robots.model.mesh_file import find_mesh, primitive, read_mesh
 from golem.robots.model.spatial import rotation_rpy, transform
 from golem.types import Array
@@ -151,14 +144,12 @@ class _Reader:
 def read_urdf(root: ET.Element, file: Path, choice: GeometryChoice, packages: Mapping[str, Path]) -> RobotGeometry:
     """Return the links of a URDF; see `read_geometry`.
 
-    A joint whose limits are equal stays where they are.
+    A joint whose limits are equal stays where they are. Raises ConfigError: something is wrong with it; names all that
+    is.
 
     Args:
         root: its element `robot`.
         packages: folders of ROS packages by name.
-
-    Raises:
-        ConfigError: something is wrong with it; names all that is.
     """
     unfilled = any("${" in value for element in root.iter() for value in element.attrib.values())
     if any("xacro" in element.tag for element in root.iter()) and (unfilled or root.find("link") is None):
@@ -206,12 +197,12 @@ def read_urdf(root: ET.Element, file: Path, choice: GeometryChoice, packages: Ma
             chain = [base] if floats else reader.joint(element)  # the free root of a robot that goes about
             waiting.append((child, here, chain or [base]))
     bar.close()
-    links, wrong = led(links)
+    links, wrong = link_geometry.led(links)
     findings += wrong
     if findings:
         more = f"; and {len(findings) - NAMED} more" if len(findings) > NAMED else ""
         raise ConfigError(f"'{file}' cannot be read as a robot: {'; '.join(findings[:NAMED])}{more}.")
-    return with_surface(RobotGeometry(file.stem, tuple(links)))
+    return link_geometry.with_surface(RobotGeometry(file.stem, tuple(links)))
 
 
 def _link(joint: ET.Element, end: str) -> str:

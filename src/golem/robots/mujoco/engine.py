@@ -54,14 +54,11 @@ class MujocoRobot:
     """
 
     def __init__(self, profile: str, seed: int, posture: Array, config: MujocoConfig | None = None) -> None:
-        """Build the world of one episode.
+        """Build the world of one episode. Raises ConfigError: the profile or an option does not exist.
 
         Args:
             seed: draws screws, terrain, calibration errors, noise and sway.
             posture: (27,) true joint positions to start from [rad]; arms that hang start as they hang.
-
-        Raises:
-            ConfigError: the profile or an option does not exist.
         """
         self.config = config or MujocoConfig()
         self.profile = load_profile(profile)

@@ -71,8 +71,7 @@ class Pushes:
     def set(self, force: Array, body: str, point: Array | None) -> None:
         """Replace the force on `body`; arguments as in `MujocoRobot.push`.
 
-        Raises:
-            ConfigError: the robot has no such link, or an array has another shape or is not finite.
+        Raises ConfigError: the robot has no such link, or an array has another shape or is not finite.
         """
         if body not in LINKS:
             raise unknown_name("link to push", body, LINKS)

@@ -27,11 +27,9 @@ class GlContext(Protocol):
 
     def make_current(self) -> None:
         """Direct the OpenGL calls of this thread to this context."""
-        ...
 
     def free(self) -> None:
         """Release it."""
-        ...
 
 
 class _OfThread(threading.local):

@@ -147,16 +147,13 @@ class LidarSensor:
     def __init__(
         self, scene: Scene, profile: str, seed: int, *, mount: Array | None = None, dropout: float | None = None
     ) -> None:
-        """Hang the sensor on the torso of the robot in `scene`.
+        """Hang the sensor on the torso of the robot in `scene`. Raises ConfigError: there is no such profile.
 
         Args:
             scene: world and robot; a copy is kept.
             seed: draws mounting error, bias and noise.
             mount: (4, 4) pose of the real lidar_link in the nominal one instead of the draw.
             dropout: share of lost points instead of the profile's.
-
-        Raises:
-            ConfigError: there is no such profile.
         """
         errors = mid360.lidar_errors(profile)
         self.errors = errors if dropout is None else replace(errors, dropout=dropout)
@@ -248,10 +245,7 @@ class LidarSensor:
         n, errors, data = len(noise), self.errors, self._data
         offsets = np.arange(1, n + 1) / mid360.POINT_RATE
         rays = mid360.directions(start + offsets)
-        if errors.direction_noise > 0.0:
-            rays_true = shaken(rays, noise, errors.direction_noise)
-        else:
-            rays_true = rays
+        rays_true = shaken(rays, noise, errors.direction_noise) if errors.direction_noise > 0.0 else rays
         distance = np.empty(n)
         azimuth, slack = (
             2.0 * np.pi * np.mod(mid360.TURNS * (start + offsets), 1.0),

@@ -181,7 +181,7 @@ class Motors:
         rng: np.random.Generator | None = None,
         backlash: float = 0.0,
     ) -> None:
-        """Attach to `model`.
+        """Attach to `model`. Raises ConfigError: the delay is longer than commands are kept.
 
         Args:
             model: its first 27 actuators are the motors, named as their joints.
@@ -191,9 +191,6 @@ class Motors:
             memory: where they remember, a `MOTORS`; None is a place of their own.
             errors: of what they report; None reports what is.
             backlash: play of the gears between rotor, whose encoder reports, and link [rad].
-
-        Raises:
-            ConfigError: the delay is longer than commands are kept.
         """
         if delay > (longest := (SLOTS - 2) * TICK):
             raise ConfigError(f"The motors' delay is {delay:g} s; it may be up to {longest:g} s.")

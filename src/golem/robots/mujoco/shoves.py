@@ -82,7 +82,6 @@ class Pushable(Protocol):
 
     def push(self, force: Array, body: str, point: Array | None) -> None:
         """Push a link from outside."""
-        ...
 
 
 class Pusher:

@@ -144,9 +144,7 @@ class _Maker:
     def static(self, body: int) -> Any | None:
         """Return a body that stays, or None if it touches nothing."""
         component = self._physx.PhysxRigidStaticComponent()
-        if not self._shapes(component, body, foreign=True):
-            return None
-        return self._entity(body, component)
+        return self._entity(body, component) if self._shapes(component, body, foreign=True) else None
 
     def placed(self, body: int, component: Any, scene: Any) -> Any:
         """Add a body that is moved from outside, and return it."""

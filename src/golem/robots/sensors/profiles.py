@@ -193,14 +193,11 @@ OF_A_FILE = (
 
 
 def load_profile(name: str) -> RealismProfile:
-    """Return a profile.
+    """Return a profile. Raises ConfigError: there is no profile of that name, or the file is none.
 
     Args:
         name: `"ideal"`, `"bench"` or `"field"`, or a YAML file with the `base`, one of these, and keys of `OF_A_FILE`.
             `NAME:PART+PART` is NAME with some attributes of `RealismProfile` as `ideal` has them, e.g. `field:head`.
-
-    Raises:
-        ConfigError: there is no profile of that name, or the file is none.
     """
     if name in PROFILES:
         return PROFILES[name]

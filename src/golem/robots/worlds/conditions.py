@@ -134,16 +134,13 @@ def world_stream(seed: int) -> np.random.Generator:
 def draw_conditions(
     kind: LayoutKind, given: Mapping[str, Value], rng: np.random.Generator, world: str = "pack"
 ) -> Conditions:
-    """Return the conditions of one work place.
+    """Return the conditions of one work place. Raises ConfigError: see `check_condition`.
 
     Args:
         kind: `nominal` draws nothing.
         given: conditions that are not left to the draw.
         rng: the same state draws the same.
         world: which pack stands there.
-
-    Raises:
-        ConfigError: see `check_condition`.
     """
     values: dict[str, Value] = {}
     if kind == "varied":

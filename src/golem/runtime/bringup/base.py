@@ -55,7 +55,6 @@ class BringupPerson(Protocol):
 
     def tell(self, text: str) -> None:
         """Say something."""
-        ...
 
     def confirm(self, question: str, word: str) -> bool:
         """Return whether they answer with exactly `word`."""
@@ -63,7 +62,6 @@ class BringupPerson(Protocol):
 
     def act(self, task: Task) -> None:
         """Ask for something to be done; returns at once."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)

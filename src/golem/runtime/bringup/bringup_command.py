@@ -42,8 +42,7 @@ class BringupReport:
     def __init__(self, folder: Path, where: str) -> None:
         """Go on from what the folder holds of the robot at `where`, if anything.
 
-        Raises:
-            ConfigError: its file cannot be read, or is about another robot.
+        Raises ConfigError: its file cannot be read, or is about another robot.
         """
         self._folder, self._where = folder, where
         self._entries: dict[str, Entry] = {}

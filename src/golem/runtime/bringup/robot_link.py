@@ -145,10 +145,7 @@ class RobotLink:
     def ask(self, what: str, every: Callable[[], None] | None = None) -> str:
         """Ask the gate to `activate`, `stop` or `reset`; return its answer.
 
-        `every` is called meanwhile as by `spin`.
-
-        Raises:
-            RosError: there is none, or it does not answer.
+        `every` is called meanwhile as by `spin`. Raises RosError: there is none, or it does not answer.
         """
         service = f"/safety/{what}"
         client = self._clients.get(service)

@@ -81,14 +81,11 @@ class StreamIn:
         tell: Callable[[str], None] = log_line,
         take: Callable[[Any], None] | None = None,
     ) -> None:
-        """Subscribe.
+        """Subscribe. Raises ValueError: the row is of no stream, not for this role, or cannot be read.
 
         Args:
             now: robot time [s].
             tell: says to a person what is refused.
-
-        Raises:
-            ValueError: the row is of no stream, not for this role, or cannot be read.
         """
         key = row.key
         if key is None:
@@ -100,14 +97,11 @@ class StreamIn:
 def outgoing(
     bus: Bus, endpoints: RoleEndpoints, encoders: Encoders | None = None, without: Collection[str] = ()
 ) -> list[Placed]:
-    """Return what sends every stream that `endpoints` offer.
+    """Return what sends every stream that `endpoints` offer. Raises ValueError: nobody says how to send one of them.
 
     Args:
         encoders: for the rows that have none.
         without: topics that somebody else sends.
-
-    Raises:
-        ValueError: nobody says how to send one of them.
     """
     encoders = encoders or {}
     return [

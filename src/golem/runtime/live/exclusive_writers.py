@@ -47,10 +47,7 @@ def refuse_second(participant: CycloneParticipant, dds: DdsConfig, *topics: str)
 
     For a robot in motion a second writer is a reason to stop, and so to fall. A robot, and a clock, may be anybody's;
     of gates and stacks only ours count, since a robot's own controller may have a writer of the motors' command, which
-    it does not use: what to make of that is the gate's business.
-
-    Raises:
-        ConfigError: somebody does.
+    it does not use: what to make of that is the gate's business. Raises ConfigError: somebody does.
     """
     time.sleep(DISCOVERY)
     _refuse_writers(participant, dds, topics)

@@ -70,8 +70,7 @@ class RestartConfig:
 def run_request(what: str, config: RequestConfig) -> bool:
     """Ask the safety process for `what`, a key of `REQUESTS`, and say what it answers; return whether it agreed.
 
-    Raises:
-        RosError: there is none, or it does not answer.
+    Raises RosError: there is none, or it does not answer.
     """
     service, request = REQUESTS[what]
     with member("operator", config.dds) as (_, node):
@@ -94,13 +93,9 @@ def run_restart(config: RestartConfig) -> bool:
 
 
 def ask(node: RosNode, service: str, kind: str, request: Any, remedy: str) -> Any:
-    """Call a service and return the response.
+    """Call a service and return the response. `remedy`: what the user can do when nobody offers it.
 
-    Args:
-        remedy: what the user can do when nobody offers it.
-
-    Raises:
-        RosError: nobody offers it, or it does not answer in time.
+    Raises RosError: nobody offers it, or it does not answer in time.
     """
     client = node.client(service, kind)
     find(node, service, client, remedy)

@@ -101,8 +101,7 @@ def _help(config: SkillClientConfig, words: list[str]) -> int:
 def local_skills(config: SkillClientConfig, words: list[str]) -> Specs | None:
     """Return the skills that are defined here: by a stack file, or by the class that `words` begin with; else None.
 
-    Raises:
-        ConfigError, ModuleFault: it cannot be loaded.
+    Raises ConfigError, ModuleFault: it cannot be loaded.
     """
     if config.stack is not None:
         return SkillTable(load_stack(config.stack)).specs
@@ -190,8 +189,7 @@ def pursue(node: RosNode, goal: RunSkill_Goal, remedy: str, stop: threading.Even
 def propose(node: RosNode, goal: RunSkill_Goal, remedy: str) -> ClientGoal:
     """Give a goal whose feedback is printed, and return it once it was accepted.
 
-    Raises:
-        RosError: nobody offers the action, it does not answer, or it rejects the goal; `remedy` says what to do.
+    Raises RosError: nobody offers the action, it does not answer, or it rejects the goal; `remedy` says what to do.
     """
     client = node.action_client(RUN, next(row.type for row in public.ACTIONS if row.name == RUN))
     find(node, RUN, client, remedy)

@@ -124,15 +124,12 @@ class Twin:
         patience: float = PATIENCE,
         tell: Callable[[str], None] = log_line,
     ) -> None:
-        """Put a robot on the domain.
+        """Put a robot on the domain. Raises ConfigError, ModuleFault: about the on-board legs.
 
         Args:
             render_worker: where its images are made; None renders here, which holds everything else up meanwhile.
             patience: how long its time stands still at most for a stack that is behind [s].
             tell: says a line to a person.
-
-        Raises:
-            ConfigError, ModuleFault: about the on-board legs.
         """
         bus = Bus()
         images = image_topics()

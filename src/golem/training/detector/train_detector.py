@@ -32,11 +32,9 @@ from golem.types import Array
 def load_onnx(model: PartNet, path: Path, classes: Sequence[str]) -> None:
     """Give `model` the weights of an ONNX file that `export_onnx` wrote.
 
-    The normalisation is folded into the convolutions there: here it begins with mean 0 and variance 1. Classes that
-    the file does not know keep their random weights; its classes that the network lacks are left out.
-
-    Raises:
-        ValueError: the file is no such detector.
+    The normalisation is folded into the convolutions there: here it begins with mean 0 and variance 1. Classes that the
+    file does not know keep their random weights; its classes that the network lacks are left out. Raises ValueError:
+    the file is no such detector.
     """
     network = onnx.load(str(path))
     known = json.loads(next(p.value for p in network.metadata_props if p.key == "classes"))

@@ -40,9 +40,7 @@ TRAINED = "golem.trained"
 
 def load_actor(path: Path) -> Actor:
     """Return the trained actor of a checkpoint, or of an exported network (`.onnx`). Raises ConfigError: neither."""
-    if path.suffix == ".onnx":
-        return _exported_actor(path)
-    return _trained_actor(read_checkpoint(path))
+    return _exported_actor(path) if path.suffix == ".onnx" else _trained_actor(read_checkpoint(path))
 
 
 def _trained_actor(saved: dict[str, Any]) -> Actor:
@@ -171,10 +169,8 @@ def average(networks: Sequence[Path], weights: Sequence[float], out: Path) -> No
 
     Wortsman et al., "Model soups: averaging weights of multiple fine-tuned models improves accuracy without increasing
     inference time", ICML 2022. Networks that were trained apart from the first step on have nothing in common, and
-    their mean does nothing.
-
-    Raises:
-        ConfigError: a file is no such network, the weights do not fit, or `out` is no name of a network.
+    their mean does nothing. Raises ConfigError: a file is no such network, the weights do not fit, or `out` is no name
+    of a network.
     """
     if len(networks) < 2 or len(weights) != len(networks):
         raise ConfigError("Give two networks or more, and --weights with a number for each of them.")

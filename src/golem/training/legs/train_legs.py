@@ -232,10 +232,8 @@ class _Run:
     def begin_with(self, path: Path) -> None:
         """Take over networks and steps of another run's checkpoint, or a network that was exported.
 
-        Configuration, draws and noise are this run's own.
-
-        Raises:
-            ConfigError: it has as many steps as this run is to have, or this run is too short to change anything.
+        Configuration, draws and noise are this run's own. Raises ConfigError: it has as many steps as this run is to
+        have, or this run is too short to change anything.
         """
         if self._exported:
             if self.config.steps <= VALUES_FIRST:

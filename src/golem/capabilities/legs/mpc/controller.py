@@ -236,9 +236,8 @@ class MPC:
     def __init__(self, config: MPCConfig | None = None) -> None:
         """Build the planning model.
 
-        Raises:
-            ConfigError: the stance is unknown, the gains are not six each, a time or rate is not positive, or an option
-                of the planner is wrong.
+        Raises ConfigError: the stance is unknown, the gains are not six each, a time or rate is not positive, or an
+        option of the planner is wrong.
         """
         self.config = c = config or MPCConfig()
         if c.stance not in STANCES:
@@ -279,8 +278,7 @@ class MPC:
     def step(self, state: LowState, base: BaseEstimate, motion: LocomotionCommand, dt: float) -> LegCommand:
         """Return the plan's targets for when they arrive, after planning anew if it is time; see `LowerBody.step`.
 
-        Raises:
-            PlanningError: no rollout has been finite for `FAILURES` plans in a row.
+        Raises PlanningError: no rollout has been finite for `FAILURES` plans in a row.
         """
         self._age += dt
         if self._age > 1.0 / self.config.plan_rate - 0.5 * dt:

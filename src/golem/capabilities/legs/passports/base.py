@@ -149,8 +149,7 @@ def read_term(
 def target_limits(names: Sequence[str], clip: object) -> tuple[tuple[float, float], ...]:
     """Return the limits (12) of the leg targets that the `clip` of an action gives to the joints `names`; none if None.
 
-    Raises:
-        ConfigError: it is no list of pairs.
+    Raises ConfigError: it is no list of pairs.
     """
     if clip is None:
         return ()

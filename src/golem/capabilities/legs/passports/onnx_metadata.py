@@ -19,8 +19,7 @@ KEYS = base.KEYS_OF["onnx_metadata"]
 def read(path: Path, network: Path | None) -> base.Passport:
     """Return the passport in the metadata of `path`, or of `network` if that has some.
 
-    Raises:
-        ConfigError: no network, metadata that are missing, or that cannot be meant.
+    Raises ConfigError: no network, metadata that are missing, or that cannot be meant.
     """
     found = dict(onnx_session(path).get_modelmeta().custom_metadata_map)
     absent = [key for key in NEEDED if key not in found]
