@@ -106,3 +106,27 @@ def test_what_is_there_before_is_averaged_over_the_rest(world: Any) -> None:
         feel(world, 17.0)
         guard()
     assert guard.stuck and guard.largest == pytest.approx(12.0, abs=0.5)
+
+
+def test_what_the_arm_takes_for_itself_on_the_lead_is_no_contact(world: Any) -> None:
+    feel(world, 0.0)
+    guard = ForceGuard(world.context, "right", UP, force=8.0, lead=0.02)
+
+    def rise(force: float, way: float) -> bool:
+        T = world.context.arms["right"].commanded.copy()
+        T[2, 3] += way
+        world.context.arms["right"].stays_at(T)
+        feel(world, force)
+        return guard()
+
+    assert not any(rise(10.0, 0.0005) for _ in range(60))
+    assert any(rise(19.0, 0.0005) for _ in range(2 * TICKS)) and guard.stuck
+
+
+def test_on_the_lead_a_wall_is_a_contact(world: Any) -> None:
+    feel(world, 0.0)
+    guard = ForceGuard(world.context, "right", UP, force=8.0, lead=0.02)
+    for _ in range(2 * TICKS):
+        feel(world, 30.0)
+        guard()
+    assert guard.stuck

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Literal
 
@@ -111,6 +111,8 @@ RAISING = 0.15
 """Speed of that [m/s]."""
 BENT = ((0.02, 0.1), (0.1, 0.3))
 """How far the hand may leave its line then, and turn [m, rad]; what comes first is tried first."""
+ACROSS = 0.1
+"""So far beside the robot a place is that of one hand [m]."""
 TURN = 0.6
 """How far the robot turns where nothing is remembered at all [rad]."""
 
@@ -186,7 +188,14 @@ class Fetch:
             await context.until(lambda: context.legs.reporting, FIRST_REPORT)
             walks, home = context.legs.status.speed > 0.0, PlanarPose.of(context.legs.pose)
             to = self._destination(context, goal, home)
-            report.taken = await self._take_one(context, goal, report, walks)
+            nearer = goal if walks or to is None else self._by_the_nearer_hand(context, goal, to)
+            try:
+                report.taken = await self._take_one(context, nearer, report, walks)
+            except StageFailed as failure:
+                if nearer is goal:
+                    raise
+                context.say(failure.stage, f"{failure} Trying with either hand.")
+                report.taken = await self._take_one(context, goal, report, walks)
             reason = await self._bring(context, goal, report, walks, home, to)
         except StageFailed as failure:
             context.say(failure.stage, str(failure), failed=True)
@@ -204,6 +213,13 @@ class Fetch:
             return place
         place = home @ place
         return context.T_odom_map.to(place) if context.mapped else place
+
+    def _by_the_nearer_hand(self, context: Context, goal: FetchGoal, to: PlanarPose) -> FetchGoal:
+        """Return the goal for the hand on whose side it is set down, by a robot that stays where it is."""
+        T, spot = context.T_odom_base, np.append(self._in_odom(context, to), 0.0)
+        aside = float((spot - T[:3, 3]) @ T[:3, 1])
+        near = goal.side == "either" and abs(aside) > ACROSS
+        return replace(goal, side="left" if aside > 0.0 else "right") if near else goal
 
     async def _take_one(self, context: Context, goal: FetchGoal, report: FetchReport, walks: bool) -> TakeReport:
         context.say("recall", f"Where is the {goal.text}?")

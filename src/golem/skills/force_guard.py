@@ -67,6 +67,8 @@ TICKS = 5
 """Ticks over which the force is averaged: the torques of one tick are off by 2 to 3 N at the hand."""
 REST = 10
 """Ticks at rest over which the force before the motion is averaged."""
+LEADING = 3.0
+"""So many times the force may be met on the way on which the arm's own is learned."""
 STILL = 0.001
 """What goes further than this within `TICKS` is not held [m]: its force is that of the arm's own acceleration."""
 
@@ -79,21 +81,24 @@ class ForceGuard:
         largest: largest force of the hand along the motion while it was asked, averaged over `TICKS` [N].
     """
 
-    def __init__(self, context: Context, side: Side, axis: Array, force: float, length: float = np.inf) -> None:
+    def __init__(
+        self, context: Context, side: Side, axis: Array, force: float, length: float = np.inf, lead: float = 0.0
+    ) -> None:
         """Begin where the hand is now; see `at_rest`."""
         self._context, self._axis = context, axis
         self._side: Side = side
-        self._force, self._length = force, length
+        self._force, self._length, self._lead = force, length, lead
         self._feel = HandForce()
         self._start = context.arms[side].commanded[:3, 3].copy()
         self._before = self._along()
         self._last: deque[tuple[float, float]] = deque(maxlen=TICKS)
+        self._own: deque[float] = deque(maxlen=5 * REST)
         self.stuck = False
         self.largest = 0.0
 
     @classmethod
     async def at_rest(
-        cls, context: Context, side: Side, axis: Array, force: float, length: float = np.inf
+        cls, context: Context, side: Side, axis: Array, force: float, length: float = np.inf, lead: float = 0.0
     ) -> ForceGuard:
         """Return a guard of a hand that is at rest now, after having felt for `REST` ticks what is there before.
 
@@ -101,8 +106,10 @@ class ForceGuard:
             axis: (3,) direction of the motion in odom, of unit length.
             force: what it may meet [N].
             length: way of the commanded pose along the axis after which nothing more is asked [m].
+            lead: way at first over which it learns what the arm takes for itself [m]: friction turns round as it
+                begins to move, 7 to 10 N at the hand. Until there it may meet `LEADING` times as much.
         """
-        guard, before = cls(context, side, axis, force, length), list[float]()
+        guard, before = cls(context, side, axis, force, length, lead), list[float]()
         for _ in range(REST):
             await context.tick()
             before.append(guard._along())
@@ -114,11 +121,20 @@ class ForceGuard:
         arm = self._context.arms[self._side]
         gone = float((arm.commanded[:3, 3] - self._start) @ self._axis)
         if not self.stuck and gone <= self._length:
+            if self._own and gone >= self._lead:
+                # What comes now is measured against what it took to get here.
+                self._before += float(np.mean(self._own))
+                self._own.clear()
+                self._last.clear()
             self._last.append((self._along() - self._before, float(arm.pose[:3, 3] @ self._axis)))
             if len(self._last) == TICKS:
                 force = float(np.mean([f for f, _ in self._last]))
                 self.largest = max(self.largest, force)
-                self.stuck = force > self._force and self._last[-1][1] - self._last[0][1] < STILL
+                limit = self._force
+                if gone < self._lead:
+                    self._own.append(force)
+                    limit *= LEADING
+                self.stuck = force > limit and self._last[-1][1] - self._last[0][1] < STILL
         return self.stuck
 
     def _along(self) -> float:

@@ -58,6 +58,8 @@ LYING = 0.6
 """Share of its height below which a thing does not stand."""
 PICTURE = 2.0
 """Time that the head camera may take for a picture [s]."""
+LEAD = 0.25
+"""Share of the way down to the place on which the arm's own friction is felt."""
 TILT = 0.4
 """How far what is held may lean on the way [rad]."""
 
@@ -311,17 +313,25 @@ class SetDown:
     async def _lower(self, context: Context, goal: PlaceGoal, side: Side, level: float) -> None:
         """Lower it until it stands: where the surface is felt, or a little deeper than where it was seen."""
         c, arm, hand = self._config, context.arms[side], context.hands[side]
-        # What slid in the fingers on the way is held again, as firmly as it was.
-        if not hand.status.holding and not await close_hand(context, side, float(hand.status.force.max())):
-            raise StageFailed("carry", "grasp_method", "It was lost on the way.")
+        force = float(hand.status.force.max())
+
+        async def hold() -> None:
+            """Hold what slid in the fingers again, as firmly as it was."""
+            if not hand.status.holding and not await close_hand(context, side, force):
+                raise StageFailed("carry", "grasp_method", "It was lost on the way.")
+
+        await hold()
         context.say("lower", "Lowering it.", side=side)
         await arm.settle(0.006, 1.0)
-        guard = await ForceGuard.at_rest(context, side, np.array([0.0, 0.0, -1.0]), c.contact)
+        guard = await ForceGuard.at_rest(context, side, np.array([0.0, 0.0, -1.0]), c.contact, lead=LEAD * c.hover)
         T = arm.commanded.copy()
         T[2, 3] = level + (goal.below or c.unknown) - c.lower
         for further in (0.0, c.deeper):
             T[2, 3] -= further
             await arm.move(T, c.lower_speed, stop=lambda: guard() or not hand.status.holding)
+            if not guard.stuck and arm.commanded[2, 3] - T[2, 3] > 2.0 * c.lower:
+                await hold()
+                await arm.move(T, c.lower_speed, stop=lambda: guard() or not hand.status.holding)
             if guard.stuck or not hand.status.holding:
                 break
         else:
