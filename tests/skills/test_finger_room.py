@@ -112,3 +112,15 @@ def test_between_walls_on_all_sides_no_finger_fits(world: Any) -> None:
     for _ in range(round(2 * PATIENCE / world.context.period)):
         seen.way(lifted(T, 0.004), lifted(T, 0.10), 0.15)
     assert seen.blocked and not seen.across
+
+
+def test_beside_a_wall_the_hand_keeps_aside_along_the_width_of_its_fingers(world: Any) -> None:
+    seen, T = room(world, (-1.0, 1.0), x=(0.012, 1.0))
+    goal, _ = seen.way(T, lifted(T, HIGH), 0.15)
+    assert not seen.blocked and not seen.across
+    np.testing.assert_allclose(goal[:2, 3], (T[:3, 3] + seen.shift)[:2])
+    assert (T[:3, :3].T @ seen.shift)[0] in (pytest.approx(-0.004), pytest.approx(-0.007))
+    assert seen.below(goal) > 0.0
+    closer, T = room(world, (-1.0, 1.0), x=(0.0, 1.0))
+    closer.way(T, lifted(T, HIGH), 0.15)
+    assert closer.blocked and not closer.shift.any()

@@ -13,7 +13,7 @@ from golem.interfaces import topics
 from golem.robots.model.magpie_model import T_HAND_CAMERA, T_HAND_GRIPPER
 from golem.robots.sensors.cameras import rays
 from golem.skills.context import Context
-from golem.skills.poses import at_height, lifted, turned
+from golem.skills.poses import at_height, lifted, moved, turned
 from golem.types import Array, RgbdImage, Side
 
 CELL = 0.004
@@ -38,8 +38,12 @@ ABOVE = 0.015
 """How far the tips stay above what is in their way [m]."""
 TURNS = (0.2, -0.2, 0.4, -0.4, 0.6, -0.6)
 """Turns about the vertical that are tried, in order, where the fingers have no room [rad]."""
+ASIDE = (0.004, -0.004, 0.007, -0.007)
+"""How far the hand keeps aside along the width of its fingers, tried first [m]: pads of 24 mm hold a screw by half."""
 ACROSS = (0.5 * np.pi, -0.5 * np.pi)
 """Turns of a hand that comes anew, for which a servo is too near [rad]: beside a wall the fingers fit along it."""
+WAYS = ((0.0, 0.0), *((0.0, aside) for aside in ASIDE), *((turn, 0.0) for turn in TURNS))
+"""Turn [rad] and way aside [m] of the hand where its fingers have no room, in order."""
 PATIENCE = 0.5
 """Time for which something is in the way before the hand comes anew [s]."""
 TURN_RATE = 0.6
@@ -57,6 +61,7 @@ class FingerRoom:
         blocked: whether something is in the way of the fingers at the last goal that was asked about, however the hand
             turns.
         across: whether that has been so for a while, and the fingers would have room across.
+        shift: (3,) by how much the hand keeps aside of its goal, in odom [m].
     """
 
     def __init__(self, context: Context, side: Side, gap: float) -> None:
@@ -65,8 +70,10 @@ class FingerRoom:
         self._middle = context.arms[side].commanded[:2, 3].copy()
         self._heights = np.full((2 * HALF, 2 * HALF), np.nan)
         self._tips, self._around = _fingertips(gap, MARGIN), _fingertips(gap, CLOSE)
-        self._turn = self._wanted = self._blocked_for = 0.0
+        self._turn = self._blocked_for = 0.0
+        self._wanted = WAYS[0]
         self.blocked = self.across = False
+        self.shift: Array = np.zeros(3)
 
     def look(self) -> None:
         """Take over what the newest image of the palm camera shows; newer is nearer, and replaces what was there."""
@@ -94,27 +101,31 @@ class FingerRoom:
             speed: limit of its speed [m/s].
         """
         if self._misses(T_goal, self._wanted) > ROUGH:
-            free = (turn for turn in (0.0, *TURNS) if self._misses(T_goal, turn) < 0.5 * ROUGH)
-            wanted = next(free, None)
+            wanted = next((way for way in WAYS if self._misses(T_goal, way) < 0.5 * ROUGH), None)
             self.blocked = wanted is None
-            self._wanted = self._wanted if wanted is None else wanted
+            self._wanted = wanted or self._wanted
         else:
             self.blocked = False
         self._blocked_for = self._blocked_for + self._context.period if self.blocked else 0.0
         if self._blocked_for > PATIENCE:
-            self.across = min(self._misses(T_goal, turn) for turn in ACROSS) < 0.5 * ROUGH
+            ways = ((turn, aside) for turn in ACROSS for aside in (0.0, *ASIDE))
+            self.across = min(self._misses(T_goal, way) for way in ways) < 0.5 * ROUGH
         step = TURN_RATE * self._context.period
-        self._turn += min(max(self._wanted - self._turn, -step), step)
+        turn, aside = self._wanted
+        self._turn += min(max(turn - self._turn, -step), step)
         T = turned(T_goal, self._turn)
+        self.shift = aside * T[:3, 0]
+        T = moved(T, self.shift)
         missing = -self.below(T)
         up = ABOVE + missing if missing > ROUGH else min(max(KEPT + missing, 0.0), RAISED)
         T = lifted(T, up)
         room = min(self._room(self._around, T_now), self._room(self._around, at_height(T, T_now[2, 3])))
         return T, min(max(GAIN * room, SLOW), speed)
 
-    def _misses(self, T_goal: Array, turn: float) -> float:
-        """Return by how much the fingers miss the room they need at a goal (4, 4) that is turned [m]."""
-        return -self.below(turned(T_goal, turn))
+    def _misses(self, T_goal: Array, way: tuple[float, float]) -> float:
+        """Return by how much fingers miss the room they need at a goal (4, 4), turned and aside as in `WAYS` [m]."""
+        T = turned(T_goal, way[0])
+        return -self.below(moved(T, way[1] * T[:3, 0]))
 
     def below(self, T: Array) -> float:
         """Return how far the fingertips of a hand at `T` (4, 4) in odom are above what is below them [m].

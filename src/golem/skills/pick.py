@@ -16,7 +16,7 @@ from golem.skills.base import SkillCancelled, SkillResult, StageFailed
 from golem.skills.context import Context
 from golem.skills.finger_room import ACROSS, FingerRoom
 from golem.skills.force_guard import CLOSED, ForceGuard
-from golem.skills.hand_offset import learn_offset
+from golem.skills.hand_offset import learn_offset, made_up
 from golem.skills.pack_view import see_fasteners
 from golem.skills.pick_config import PickConfig, PickFailed, PickGoal, PickOutcome, PickReport, Sight, outcome_of
 from golem.skills.pick_place import look_after, place, pull
@@ -30,8 +30,6 @@ FINAL = (PickOutcome.TIGHT, PickOutcome.OUT_OF_REACH)
 """What a second try with the same hand would not change."""
 SETTLED = (*FINAL, PickOutcome.JAMMED)
 """What a second look would not change either."""
-ARRIVED, INTEGRAL, DROOP = 0.004, 2.5, 0.012
-"""A hand sent this near to its goal arrives, and what holds it off is integrated [m]; how fast [1/s], how far [m]."""
 EXPECTED = (0.03, 0.03, 0.045)
 """How far along x, y, z an object may be from where a palm camera is known to show it [m]: two of a real pack are 34 mm
 apart, or one is 65 mm lower than the other."""
@@ -52,7 +50,7 @@ class Pick:
         self._report = PickReport()
         self._heights: list[float] = []
         self._looks_again = self._across = False
-        self._off, self._sure, self._landmarks = np.zeros(3), False, np.zeros((0, 3))
+        self._off, self._sure, self._level, self._landmarks = np.zeros(3), False, False, np.zeros((0, 3))
         self._seen: Array | None = None
 
     def timeout(self, goal: PickGoal) -> float:
@@ -63,7 +61,7 @@ class Pick:
         """Pick one object with whatever grasp method the stack chose; see `Skill`."""
         self._method, self._names = context.grasp_method(), names_of(goal.label, goal.wanted)
         self._off, self._sure = np.array([*(goal.off or (0.0, 0.0)), 0.0]), bool(goal.off)
-        self._landmarks = np.array(goal.landmarks).reshape(-1, 3)
+        self._landmarks, self._level = np.array(goal.landmarks).reshape(-1, 3), bool(goal.level)
         await self._choose_height(context, goal)
         lines = LineTravel(context, self._config.travel_height, self._config.tolerance)
         planned = self._config.travel == "planned"
@@ -216,10 +214,16 @@ class Pick:
         target = attempt.target
         return replace(target, position=target.position + self._off, points=target.points + self._off)
 
+    @property
+    def _within(self) -> Array:
+        """How far the object may be from where it is expected, along x, y, z [m]."""
+        apart, level = np.array(EXPECTED), np.array([np.inf, np.inf, EXPECTED[2] if self._level else np.inf])
+        return apart if self._sure else level
+
     def _mine(self, attempt: Attempt, seen: Sequence[LocalizedObject]) -> list[LocalizedObject]:
         """Return what a palm camera shows that may be the object, under its label."""
         aim = attempt.target.position + self._off
-        mine = [one for one in seen if not self._sure or (np.abs(one.position - aim) < EXPECTED).all()]
+        mine = [one for one in seen if (np.abs(one.position - aim) < self._within).all()]
         return [called(one, attempt.label) for one in mine]
 
     async def _over(self, context: Context, attempt: Attempt, grasp: Grasp) -> None:
@@ -292,7 +296,7 @@ class Pick:
                     live = context.modules.worker is not None
                     law.see(context.t, attempt.side, context.T_odom_base, observer.observation, live)
                 things = None if fresh is None else self._mine(attempt, fresh.objects)
-                step = law.step(context.t, things, arm.pose)
+                step = law.step(context.t, things, moved(arm.pose, -room.shift))
                 self._seen = followed(self._seen, step)
                 if not closing:
                     if fresh is not None:
@@ -328,7 +332,7 @@ class Pick:
                     droop = made_up(droop, T, arm.commanded, arm.pose, context.period)
                     arm.approach(moved(T, droop), speed)
                 elif hand.status.state is GripState.CLOSING:
-                    arm.approach(moved(step.T_odom_gripper, droop), self._config.servo_speed)
+                    arm.approach(moved(step.T_odom_gripper, droop + room.shift), self._config.servo_speed)
                 await context.tick()
         if not closing:
             raise StageFailed("servo", "grasp_method", f"No convergence within {law.patience:g} s.")
@@ -354,22 +358,6 @@ class Pick:
         """Go straight up, away from what was not taken, with the fingers open."""
         arm = context.arms[side]
         await arm.move(lifted(arm.commanded, self._config.clearance), self._config.travel_speed)
-
-
-def made_up(droop: Array, T_goal: Array, T_sent: Array, T_now: Array, dt: float) -> Array:
-    """Return (3,) by how much beside its goal a hand is sent, that measured it comes there, across its approach [m].
-
-    Errors of torques and friction hold an arm by millimetres off where it is sent, and the servo closes within 3 mm.
-
-    Args:
-        droop: (3,) the same until now [m].
-        T_goal, T_sent, T_now: (4, 4) the goal, where the hand was sent, and the measured hand.
-        dt: time since then [s].
-    """
-    across = np.eye(3) - np.outer(T_goal[:3, 2], T_goal[:3, 2])
-    arrives = np.linalg.norm(across @ (T_goal[:3, 3] + droop - T_sent[:3, 3])) < ARRIVED
-    droop = droop + (INTEGRAL * dt if arrives else 0.0) * (across @ (T_goal[:3, 3] - T_now[:3, 3]))
-    return droop * min(1.0, DROOP / max(float(np.linalg.norm(droop)), 1e-9))
 
 
 def followed(seen: Array | None, step: ServoStep) -> Array | None:
