@@ -199,6 +199,25 @@ def test_what_is_held_stays_held_where_no_surface_is_seen(world: Any) -> None:
     assert world.bus.latest(topics.hand_goal("right")) is None
 
 
+def test_the_place_is_looked_at_anew_since_the_last_picture_has_the_thing_where_it_stood(
+    world: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    at_home(world)
+    asked: list[float] = []
+
+    def see() -> list[LocalizedObject]:
+        asked.append(world.t)
+        return []
+
+    world.objects["head"] = see
+    monkeypatch.setattr(SetDown, "_holder", lambda *_: "right")
+    for label in ("", "bowl"):
+        began = world.t
+        result = world.run(SetDown().run(world.context, PlaceGoal(0.4, 0.0, label=label))).result
+        assert result.reason == "The head camera shows no surface at that place."
+        assert bool(asked) == bool(label) and all(t >= began for t in asked)
+
+
 def test_what_does_not_stand_where_it_was_set_down_is_not_done() -> None:
     table, can = table_with_can()
     goal, spot = PlaceGoal(0.5, -0.2, below=0.08, above=0.04, radius=0.034), np.array([0.5, -0.2, TOP])

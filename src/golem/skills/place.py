@@ -182,13 +182,12 @@ class SetDown:
         try:
             side = self._holder(context, goal)
             self._report.side = side
+            await self._look(context, goal)
             spot = self._spot(context, motion, goal, side)
             await self._carry(context, motion, goal, side, spot)
             await self._lower(context, goal, side, float(spot[2]))
             await self._release(context, motion, side)
-            if goal.label:
-                with context.watch("head", goal.label) as eye:
-                    await eye.look(PICTURE)
+            await self._look(context, goal)
             self._stands(context, goal, spot)
         except StageFailed as failure:
             context.say(failure.stage, str(failure), failed=True)
@@ -208,6 +207,12 @@ class SetDown:
                 return side
         who = "Neither hand holds" if goal.side == "either" else f"The {goal.side} hand does not hold"
         raise StageFailed("detect", "grasp_method", f"{who} anything.")
+
+    async def _look(self, context: Context, goal: PlaceGoal) -> None:
+        """Have a new picture: in that by which it was taken, the thing still stands where it was."""
+        if goal.label:
+            with context.watch("head", goal.label) as eye:
+                await eye.look(PICTURE)
 
     def _spot(self, context: Context, motion: PlannedMotion, goal: PlaceGoal, side: Side) -> Array:
         """Return the (3,) middle of the place on its surface, in odom, after a look whether it is free."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -93,6 +94,19 @@ def test_one_sample_that_jumps_is_dropped_and_a_run_of_them_is_a_fault() -> None
     fault, after, dropped = run(part("q", slice(16, 17), lambda t: 0.5), sent)
     assert fault is not None and fault.reason is Reason.STATE_IMPLAUSIBLE
     assert dropped == 3 and after <= 0.0041 and fault.stands
+
+
+def rolled(angle: float, until: float) -> Spoil:
+    """Roll the IMU by an angle [rad] until a time [s]."""
+    off = np.array([math.cos(0.5 * angle), math.sin(0.5 * angle), 0.0, 0.0])
+    return lambda t, s: replace(s, imu=replace(s.imu, quat=off)) if t < until else s
+
+
+def test_an_orientation_that_jumps_once_is_dropped_and_one_that_stays_there_stops() -> None:
+    sent = LowCommand(0.0, ZERO, ZERO, ZERO, ZERO, ZERO)
+    assert run(rolled(1.05, DT / 2), sent) == (None, 0.0, 1)
+    fault, after, dropped = run(rolled(1.05, math.inf), sent)
+    assert fault is not None and fault.reason is Reason.IMU_IMPLAUSIBLE and dropped == 3 and after <= 0.0041
 
 
 @pytest.mark.parametrize(

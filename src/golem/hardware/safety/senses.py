@@ -45,6 +45,8 @@ GRAVITY_TIME = 0.5
 """Time constant of the mean specific force, and how long a robot has to be calm for it to be judged [s]."""
 CALM = 0.3
 """Rate of the torso below which the robot hardly moves [rad/s]."""
+SPIN = 40.0
+"""Rate that no torso turns with between two looks [rad/s]: the gyroscope's range ends at 35."""
 _ZERO, _NONE = np.zeros(NUM_JOINTS), np.zeros(ASKED)
 
 
@@ -111,6 +113,12 @@ def sense(
         moved = np.abs(state.q - q)
         if np.count_nonzero(moved > limits.jump * max(1.0, apart / TICK)):
             return _jumped(state, tick, memory, limits, moved, sent is not None)
+    if sent is not None and memory.looked is not None and LOOK <= tick - memory.looked_at < LOST:
+        turned = 2.0 * math.acos(min(1.0, abs(float(memory.looked.imu.quat @ state.imu.quat))))
+        if turned > SPIN * (tick - memory.looked_at):
+            memory = replace(memory, bad=memory.bad + 1.0)
+            fault = Fault(Reason.IMU_IMPLAUSIBLE, f"orientation jumped by {turned:.2f} rad")
+            return memory, False, fault if memory.bad >= limits.bad_frames else None
     bad, drift = max(0.0, memory.bad - limits.frame_leak), memory.drift
     if q is not None and dq is not None and 0.0 < apart <= STEADY:
         drift = (1.0 - apart / FORGET) * drift + (state.q - q) - (0.5 * apart) * (state.dq + dq)
