@@ -49,7 +49,8 @@ def resolve(name: str, node: str, namespace: str) -> str:
     root = "" if namespace == "/" else namespace
     if name.startswith("~/"):
         full = f"{root}/{node}/{name[2:]}"
-    full = name if name.startswith("/") else f"{root}/{name}"
+    else:
+        full = name if name.startswith("/") else f"{root}/{name}"
     try:
         return _check("topic, service or action", full, MAX_TOPIC)
     except ConfigError as error:
