@@ -173,12 +173,8 @@ class Desk:
         while self._recent and self._recent[0] < now - 1.0:
             self._recent.popleft()
         known = call.tool if call.tool in self.tools else shorten(repr(call.tool))
-        self._tell(
-            "call",
-            call,
-            tool=known,
-            arguments=call.arguments if _size(call.arguments) <= LARGEST else {"more than": LARGEST},
-        )
+        arguments = call.arguments if _size(call.arguments) <= LARGEST else {"more than": LARGEST}
+        self._tell("call", call, tool=known, arguments=arguments)
         try:
             if call.tool != "stop":
                 if len(self._recent) >= self.rules.calls:
@@ -214,7 +210,11 @@ class Desk:
         if problem:
             raise GolemError(problem)
         if call.tool not in STILL:
-            self._lease(call.session)
+            now = self._clock()
+            held = self._active is not None or bool(self.asked) or now - self._seen < self.rules.lease
+            if self._owner not in ("", call.session) and held:
+                raise GolemError("Another client has the lease for motions.")
+            self._owner, self._seen = call.session, now
         if rule.run == "free":
             return self._begin(call)
         if any(other.session == call.session for other in self.asked.values()):
@@ -240,13 +240,6 @@ class Desk:
         if None in places:
             raise GolemError(f"Where the frame '{frame}' is, is not known, so the region cannot be kept.")
         return [place for place in places if place is not None]
-
-    def _lease(self, session: str) -> None:
-        now = self._clock()
-        held = self._active is not None or bool(self.asked) or now - self._seen < self.rules.lease
-        if self._owner not in ("", session) and held:
-            raise GolemError("Another client has the lease for motions.")
-        self._owner, self._seen = session, now
 
     def _begin(self, call: Call) -> None:
         if self._active is not None:

@@ -53,9 +53,8 @@ def _narrowed(schema: Schema, path: list[str], allowed: list[Any]) -> Schema:
     of = schema.get("properties", {}).get(path[0])
     if of is None:
         return schema
-    narrow = (
-        {"enum": allowed} if isinstance(allowed[0], str) else dict(zip(("minimum", "maximum"), allowed, strict=True))
-    )
+    words = isinstance(allowed[0], str)
+    narrow = {"enum": allowed} if words else dict(zip(("minimum", "maximum"), allowed, strict=True))
     if len(path) > 1:
         of = _narrowed(of, path[1:], allowed)
     else:

@@ -97,9 +97,9 @@ class SentencePlanner:
 
     def _to_where(self, thing: str, other: str, tense: str, when: str = "") -> ErrandReport:
         spot = self._recall(other, tense, when)
-        return (
-            ErrandReport(False, f"Nothing is remembered of the {other}.") if spot is None else self._fetch(thing, spot)
-        )
+        if spot is None:
+            return ErrandReport(False, f"Nothing is remembered of the {other}.")
+        return self._fetch(thing, spot)
 
     def _back(self, thing: str, when: str = "") -> ErrandReport:
         return self._to_where(thing, thing, "was", when)

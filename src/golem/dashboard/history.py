@@ -19,11 +19,7 @@ QUANTITIES = {"angle [rad]": "q", "speed [rad/s]": "dq", "torque [N m]": "tau"}
 """What is kept of every joint, and where the motors' state has it."""
 BALANCE = "CoM margin [m], simulator's truth"
 HEIGHT = "height of base_link [m], estimate"
-SIGNALS = (
-    *(f"{joint.removesuffix('_joint')}, {what}" for what in QUANTITIES for joint in JOINT_NAMES),
-    BALANCE,
-    HEIGHT,
-)
+SIGNALS = (*(f"{joint.removesuffix('_joint')}, {w}" for w in QUANTITIES for joint in JOINT_NAMES), BALANCE, HEIGHT)
 """What can be plotted."""
 
 

@@ -32,9 +32,7 @@ class LegsPanel:
         from viser import Icon
 
         with gui.add_folder("Walk"):
-            self._sliders = {
-                name: gui.add_slider(label, 0.0, 0.0, STEP, 0.0, disabled=True) for name, label in AXES.items()
-            }
+            self._sliders = {k: gui.add_slider(label, 0.0, 0.0, STEP, 0.0, disabled=True) for k, label in AXES.items()}
             self.stop_button = gui.add_button("Stop walking", color="gray", icon=Icon.PLAYER_STOP)
         with gui.add_folder("Push"):
             self._direction = gui.add_dropdown("to the", list(WORDS), initial_value="left")

@@ -114,7 +114,10 @@ class LiveView(AbstractContextManager["LiveView", None]):
         if passive:
             self._busy = True
             self._panel.skill.hide()
-            self._await_by_the_clock()
+            print(f"Live view: {self.url}   (Ctrl-C ends it)", flush=True)
+            end = time.monotonic() + ARRIVAL
+            while not self._server.get_clients() and time.monotonic() < end:
+                time.sleep(PERIOD)
             running.executor.add(self)
 
     def step(self, t: float) -> None:
@@ -171,23 +174,13 @@ class LiveView(AbstractContextManager["LiveView", None]):
             self._ended = self._running.executor.t
             self.update()
 
-    def _await_by_the_clock(self) -> None:
-        """Let the robot be until somebody looks, for `ARRIVAL` at most."""
-        print(f"Live view: {self.url}   (Ctrl-C ends it)", flush=True)
-        end = time.monotonic() + ARRIVAL
-        while not self._server.get_clients() and time.monotonic() < end:
-            time.sleep(PERIOD)
-
     def await_spectator(self, patience: float = ARRIVAL) -> None:
         """Let time pass until somebody looks, at most `patience` [s] of robot time."""
         end = self._running.executor.t + patience
         self.idle(lambda: bool(self._server.get_clients()) or self._running.executor.t >= end)
 
     def wait_for_skill(self) -> tuple[str | Routine[Context, Any], Any] | None:
-        """Let time pass until the operator starts a skill or moves the arms; return it and its goal.
-
-        None is for starting over.
-        """
+        """Let time pass until the operator starts a skill or moves the arms; return it and its goal, or None."""
         self.idle(lambda: self._wanted is not None or self._restart)
         wanted, self._wanted = self._wanted, None
         self._restart = False
@@ -248,23 +241,14 @@ class LiveView(AbstractContextManager["LiveView", None]):
         status, shown = read_status(self._running), self._panel.view
         moment = self._history.before(shown.age)
         assert moment is not None
+        target, poses = self._timeline.target if self._busy else None, (moment.positions, moment.orientations)
         with self._server.atomic():
-            self._stage.show(
-                t - self._shown,
-                self._timeline.target if self._busy else None,
-                (moment.positions, moment.orientations),
-                follow=shown.follows,
-            )
+            self._stage.show(t - self._shown, target, poses, follow=shown.follows)
             self._show_push(t)
         self._shown = t
+        stages, pressed = self._timeline.durations(t if self._busy else self._ended), self._running.estop.pressed
         self._panel.show_status(
-            status,
-            self._timeline.durations(t if self._busy else self._ended),
-            self._factor,
-            self._note,
-            pressed=self._running.estop.pressed,
-            paused=self._paused,
-            busy=self._busy,
+            status, stages, self._factor, self._note, pressed=pressed, paused=self._paused, busy=self._busy
         )
         if now >= self._next_camera:
             self._next_camera = now + CAMERA_PERIOD

@@ -309,9 +309,7 @@ def _timeline_html(stages: list[tuple[str, float]]) -> str:
     def colour(name: str) -> str:
         return STAGE_COLOURS[names.index(name) % len(STAGE_COLOURS)]
 
-    bar = "".join(
-        f'<div style="width:{100 * seconds / total:.1f}%;background:{colour(name)}"></div>' for name, seconds in stages
-    )
+    bar = "".join(f'<div style="width:{100 * s / total:.1f}%;background:{colour(name)}"></div>' for name, s in stages)
     legend = "".join(
         f'<span style="white-space:nowrap"><span style="color:{colour(name)}">&#9632;</span> '
         f"{escape(name)} {seconds:.1f}&thinsp;s</span> "

@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Any
 from unittest import mock
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from golem.errors import ConfigError, needs
@@ -76,7 +75,10 @@ class Stage:
         scene.configure_default_lights(enabled=False)
         scene.add_light_directional("/sun", intensity=1.9, cast_shadow=True, position=(1.6, -1.4, 4.0))
         scene.add_light_directional("/fill", intensity=0.5, position=(2.0, 3.0, 2.0))
-        scene.set_background_image(_sky(), format="png")
+        # Light above, darker at the horizon.
+        rows = np.linspace(0.0, 1.0, 256)[:, None, None]
+        colours = (1.0 - rows) * np.array([236.0, 241.0, 247.0]) + rows * np.array([150.0, 162.0, 178.0])
+        scene.set_background_image(np.broadcast_to(colours, (256, 4, 3)).astype(np.uint8), format="png")
         camera = server.initial_camera
         camera.position, camera.look_at = CAMERAS["standing" if standing else "hanging"]
         camera.fov = 0.75
@@ -175,13 +177,6 @@ def gizmo_pose(gizmo: Any, origin: Array) -> Array:
 def place_gizmo(gizmo: Any, T: Array, origin: Array) -> None:
     """Bring a gizmo to the pose `T` (4, 4) in odom; see `gizmo_pose`."""
     gizmo.position, gizmo.wxyz = T[:3, 3] + origin, Rotation.from_matrix(T[:3, :3]).as_quat(scalar_first=True)
-
-
-def _sky() -> NDArray[np.uint8]:
-    """Return a background that is light above and darker at the horizon."""
-    rows = np.linspace(0.0, 1.0, 256)[:, None, None]
-    colours = (1.0 - rows) * np.array([236.0, 241.0, 247.0]) + rows * np.array([150.0, 162.0, 178.0])
-    return np.broadcast_to(colours, (256, 4, 3)).astype(np.uint8)
 
 
 def serve(host: str, port: int) -> viser.ViserServer:

@@ -224,10 +224,7 @@ def rung_class(name: str) -> type[Rung[Any]]:
 
 
 def make_rung(target: str, options: Mapping[str, Any] | None = None) -> Rung[Any]:
-    """Import and make the rung at `target`, a `module:Class`, with its `options` by name.
-
-    Raises golem.errors.ConfigError: an option is wrong.
-    """
+    """Import and make the rung at `target`, a `module:Class`, with its `options`. Raises ConfigError: one is wrong."""
     kind = _load(target)
     return kind(fill(f"option of rung {kind.name}", kind.Options, options or {}))
 

@@ -44,10 +44,7 @@ class Lens:
     def straighten(
         self, rgb: NDArray[np.uint8], depth: NDArray[np.float32]
     ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
-        """Return colour (height, width, 3) and depth (height, width) [m] of the camera's size without distortion.
-
-        They are 0 beyond the image.
-        """
+        """Return colour (height, width, 3) and depth (height, width) [m] without distortion; 0 beyond the image."""
         if not self.distortion:
             return rgb, depth
         # Made when there are images: whatever size a message claims takes no memory before.

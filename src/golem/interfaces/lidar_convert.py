@@ -88,14 +88,8 @@ def to_odometry(message: Odometry) -> ExternalOdometry:
     """Return what an odometry outside of this stack says. Raises CodecError: its pose is none."""
     twist = message.twist.twist
     covariance: NDArray[np.float64] = np.array(message.pose.covariance, dtype=np.float64).reshape(6, 6)
-    return ExternalOdometry(
-        seconds(message.header.stamp),
-        matrix(message.pose.pose),
-        _array(twist.linear),
-        _array(twist.angular),
-        covariance,
-        message.child_frame_id,
-    )
+    t, T = seconds(message.header.stamp), matrix(message.pose.pose)
+    return ExternalOdometry(t, T, _array(twist.linear), _array(twist.angular), covariance, message.child_frame_id)
 
 
 def _array(v: Vector3) -> Array:

@@ -110,12 +110,8 @@ def joint_state(t: float, names: Sequence[str], q: Array, dq: Array, tau: Array)
 
 def imu(t: float, sample: Imu, frame: str) -> sensor_msgs.Imu:
     """Return a sample of the IMU in `frame`; its covariances are unknown, which ROS writes as zeros."""
-    return sensor_msgs.Imu(
-        header=header(t, frame),
-        orientation=quaternion(sample.quat),
-        angular_velocity=vector(sample.gyro),
-        linear_acceleration=vector(sample.acc),
-    )
+    quat, gyro, acc = quaternion(sample.quat), vector(sample.gyro), vector(sample.acc)
+    return sensor_msgs.Imu(header=header(t, frame), orientation=quat, angular_velocity=gyro, linear_acceleration=acc)
 
 
 def twist(command: Twist) -> geometry_msgs.Twist:
@@ -178,37 +174,22 @@ def diagnostic(
 
 def base_estimate(estimate: BaseEstimate) -> golem_interfaces.BaseEstimate:
     """Return an estimate of the base."""
-    return golem_interfaces.BaseEstimate(
-        header(estimate.t, "odom"),
-        pose(estimate.T_odom_base),
-        vector(estimate.velocity),
-        float(estimate.height),
-        np.array(estimate.contact, np.float64),
-        bool(estimate.stale),
-    )
+    place, velocity = pose(estimate.T_odom_base), vector(estimate.velocity)
+    rest = (float(estimate.height), np.array(estimate.contact, np.float64), bool(estimate.stale))
+    return golem_interfaces.BaseEstimate(header(estimate.t, "odom"), place, velocity, *rest)
 
 
 def to_base_estimate(message: golem_interfaces.BaseEstimate) -> BaseEstimate:
     """Return an estimate of the base. Raises CodecError: its pose is none."""
-    v = message.velocity
-    return BaseEstimate(
-        seconds(message.header.stamp),
-        matrix(message.pose),
-        np.array([v.x, v.y, v.z]),
-        message.height,
-        np.array(message.contact),
-        message.stale,
-    )
+    t, T, v = seconds(message.header.stamp), matrix(message.pose), message.velocity
+    contact = np.array(message.contact)
+    return BaseEstimate(t, T, np.array([v.x, v.y, v.z]), message.height, contact, message.stale)
 
 
 def hand_state(state: HandState, side: str) -> golem_interfaces.HandState:
     """Return what one hand reports."""
-    return golem_interfaces.HandState(
-        header(state.t, f"{side}_gripper"),
-        float(state.gap),
-        np.array(state.fingers, np.float64),
-        np.array(state.force, np.float64),
-    )
+    fingers, force = np.array(state.fingers, np.float64), np.array(state.force, np.float64)
+    return golem_interfaces.HandState(header(state.t, f"{side}_gripper"), float(state.gap), fingers, force)
 
 
 def to_hand_state(message: golem_interfaces.HandState) -> HandState:

@@ -142,10 +142,7 @@ class _Waiting:
         return [key.fileobj for key, _ in found if isinstance(key.fileobj, socket.socket) and key.fileobj.fileno() >= 0]
 
     def read(self, connection: socket.socket) -> bytes | None:
-        """Read on, or take a new connection where it is the listener; return the head once it is whole.
-
-        Raises OSError: the listener is closed.
-        """
+        """Read on, or take a new connection; return the head once it is whole. Raises OSError: no listener."""
         if connection is self._listener:
             try:
                 new, _ = self._listener.accept()
@@ -276,7 +273,5 @@ class TokenGate(Relay):
         return cookie.encode() if self._by_address(head) else b""
 
     def _by_address(self, head: bytes) -> bool:
-        return self._shown(re.search(rb"[?&]token=([^&\s]*)", head.partition(b"\r\n")[0]))
-
-    def _shown(self, found: re.Match[bytes] | None) -> bool:
+        found = re.search(rb"[?&]token=([^&\s]*)", head.partition(b"\r\n")[0])
         return found is not None and hmac.compare_digest(found[1], self.token.encode())

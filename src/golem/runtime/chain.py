@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -92,9 +93,7 @@ class NativeChain:
         self._memories = np.array([address(link.stage.memory) for link in links], np.int64)
         ports = {port.name: port for port in _ports(record)}
         n = len(links)
-        self._segments = {
-            (first, last): _Segment(links[first:last], ports) for first in range(n) for last in range(first + 1, n + 1)
-        }
+        self._segments = {(f, last): _Segment(links[f:last], ports) for f in range(n) for last in range(f + 1, n + 1)}
         self._prepare = [(k, link.prepare) for k, link in enumerate(links) if link.prepare is not None]
         self._passed = [(k, link.passed) for k, link in enumerate(links) if link.passed is not None]
 
@@ -239,11 +238,7 @@ def _ports(record: Records) -> list[_Port]:
         return lambda: HandState(float(row["state_t"]), float(fingers.sum()), fingers.copy(), force.copy())
 
     return [
-        _Port(
-            topics.LOW_STATE,
-            lambda value: put_state(record, value),
-            lambda: state_of(row["state"], float(row["state_t"])),
-        ),
+        _Port(topics.LOW_STATE, partial(put_state, record), lambda: state_of(row["state"], float(row["state_t"]))),
         _Port(topics.BASE, load_base, lambda: base_of(record)),
         _Port(topics.LEG_COMMAND, load_legs, None),
         _Port(topics.ARM_COMMAND, load_arms, None),

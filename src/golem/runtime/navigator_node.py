@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Executor, Future
 from typing import Literal
 
 from golem.capabilities.mapping.robot_filter import RobotFilter
@@ -57,12 +57,7 @@ class NavigatorNode:
     period = SkillNode.period
 
     def __init__(
-        self,
-        bus: Bus,
-        navigator: Navigator,
-        contract: ContractCheck,
-        legs: LegsInterface,
-        pool: ThreadPoolExecutor | None = None,
+        self, bus: Bus, navigator: Navigator, contract: ContractCheck, legs: LegsInterface, pool: Executor | None = None
     ) -> None:
         """Run a navigator.
 
@@ -147,7 +142,10 @@ class NavigatorNode:
             T = place.T_odom_map.to(HERE)
         grid, scan = self._bus.latest(topics.MAP), self._bus.latest(topics.SCAN)
         if self._frame == "map":
-            grid = self._grid_in_map(grid)
+            if grid is not self._grid[0]:
+                moved = None if grid is None else grid.in_map
+                self._grid = grid, moved
+            grid = self._grid[1]
             scan = None if scan is None else scan.seen_from(T)
         pose = T @ PlanarPose.of(self._legs.pose) @ status.rest
         inputs = NavInputs(pose, status.moving, grid, scan, self._room())
@@ -159,13 +157,6 @@ class NavigatorNode:
             return self._navigator.step(inputs, dt)
 
         return think
-
-    def _grid_in_map(self, grid: OccupancyGrid | None) -> OccupancyGrid | None:
-        """Return a map in its own frame; the same object for the same map."""
-        if grid is not self._grid[0]:
-            moved = None if grid is None else grid.in_map
-            self._grid = grid, moved
-        return self._grid[1]
 
     def _room(self) -> Footprint | None:
         """Return the footprint of the robot, seen anew twice a second; None in a stack without LiDAR."""

@@ -32,7 +32,6 @@ from golem.types import (
     Array,
     BaseEstimate,
     HandCommand,
-    HandState,
     LowCommand,
     LowState,
     PalmTargets,
@@ -243,7 +242,12 @@ class HandNode:
             self._frozen = False
             self._pass_goal()
         else:
-            self._freeze(state)
+            # While the gate is shut: keep what is held, else stay as it is; goals given meanwhile are void.
+            self._goals = self._bus.count(topics.hand_goal(self._side))
+            if not self._frozen:
+                self._frozen = True
+                if not self._contract.call(self._hand.status).holding:
+                    self._contract.call(self._hand.open, state.gap)
         command = self._contract.call(self._hand.step, state, t)
         if type(command) is not HandCommand:
             self._contract.kind("the hand command", command, HandCommand)
@@ -267,14 +271,6 @@ class HandNode:
             self._contract.call(self._hand.close, goal.force)
         else:
             self._contract.call(self._hand.open, goal.gap)
-
-    def _freeze(self, state: HandState) -> None:
-        """While the safety gate is shut: keep what is held, else stay as it is; goals given meanwhile are void."""
-        self._goals = self._bus.count(topics.hand_goal(self._side))
-        if not self._frozen:
-            self._frozen = True
-            if not self._contract.call(self._hand.status).holding:
-                self._contract.call(self._hand.open, state.gap)
 
 
 class ServoNode:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Executor, Future
 from dataclasses import replace
 
 import numpy as np
@@ -95,12 +95,7 @@ class LocalizerNode:
     """
 
     def __init__(
-        self,
-        bus: Bus,
-        localizer: Localizer,
-        camera: str,
-        contract: ContractCheck,
-        pool: ThreadPoolExecutor | None = None,
+        self, bus: Bus, localizer: Localizer, camera: str, contract: ContractCheck, pool: Executor | None = None
     ) -> None:
         """Run a localizer in `pool`; None is here, at the price of the latency that it declares."""
         self._bus, self._localizer, self._camera, self._contract = bus, localizer, camera, contract
@@ -198,7 +193,7 @@ class MemoryNode:
         cameras: Iterable[str],
         in_map: bool,
         epoch: float,
-        pool: ThreadPoolExecutor | None = None,
+        pool: Executor | None = None,
     ) -> None:
         """Feed a memory.
 

@@ -75,7 +75,8 @@ class ActNode:
         """Advance the robot by one tick; motors without a command of late are limp."""
         command = self._bus.latest(topics.LOW_CMD)
         if command is None or t - command.t > COMMAND_AGE:
-            command = _limp(t)
+            zero = np.zeros(NUM_JOINTS)
+            command = LowCommand(t, zero, zero, zero, zero, zero)
         if self._offset is not None:
             command = replace(command, q=command.q + self._offset)
         hands: dict[Side, HandCommand] = {}
@@ -88,8 +89,3 @@ class ActNode:
 
 def _stages(robot: Robot, offset: Array | None) -> tuple[CompiledStage, CompiledStage] | None:
     return robot.native(offset) if isinstance(robot, HasStages) else None
-
-
-def _limp(t: float) -> LowCommand:
-    zero = np.zeros(NUM_JOINTS)
-    return LowCommand(t, zero, zero, zero, zero, zero)

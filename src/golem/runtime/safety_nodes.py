@@ -125,15 +125,9 @@ class SafetyNode:
             # Released later, the button must not set free what was asked for before it was pressed.
             self.request = OperatorRequest.NONE
         fault = self._faults.read()
-        inputs = GateInputs(
-            t,
-            self._bus.latest(topics.LOW_STATE),
-            self._bus.latest(topics.LOW_CMD_REQUEST),
-            estop,
-            OperatorRequest.NONE if waiting else self.request,
-            self._bus.latest(topics.BASE),
-            () if fault is None else (fault,),
-        )
+        state, command = self._bus.latest(topics.LOW_STATE), self._bus.latest(topics.LOW_CMD_REQUEST)
+        request, base = OperatorRequest.NONE if waiting else self.request, self._bus.latest(topics.BASE)
+        inputs = GateInputs(t, state, command, estop, request, base, () if fault is None else (fault,))
         before = self._gate.memory.mode
         result = self._gate.step(inputs)
         if self._tally is not None:

@@ -59,14 +59,9 @@ class PinkIK(TaskSpaceController):
         self._posture.gain = min(1.0, self.config.posture_rate * dt)
         tasks = [*(self._palms[SIDES[i]] for i in wanted), self._posture]
         try:
+            damping, limits = float(task.state[LAMBDA]), [self._range, speed]
             velocity = self._pink.solve_ik(
-                configuration,
-                tasks,
-                dt,
-                solver="daqp",
-                damping=float(task.state[LAMBDA]),
-                limits=[self._range, speed],
-                safety_break=False,
+                configuration, tasks, dt, solver="daqp", damping=damping, limits=limits, safety_break=False
             )
         except self._pink.exceptions.NoSolutionFound:
             return None

@@ -199,9 +199,8 @@ class TaskSpaceController(ABC):
 
     def turn_waist(self, angle: float | None) -> None:
         """Prefer `angle` [rad] for the waist; see `HasWaist`."""
-        self.rest[0] = np.clip(
-            posture(self.config.posture)[0] if angle is None else angle, self.lower[0], self.upper[0]
-        )
+        wanted = posture(self.config.posture)[0] if angle is None else angle
+        self.rest[0] = np.clip(wanted, self.lower[0], self.upper[0])
 
     def step(self, targets_left: Array | None, targets_right: Array | None, q_measured: Array, dt: float) -> ArmCommand:
         task = self.task

@@ -74,16 +74,12 @@ class TrajectoryFollower:
         then `limited`. Raises TargetError: `dt` is not positive.
         """
         check_dt(dt)
-        wanted = self._at(t - self._t)
+        wanted = interpolate(self._times, self._points, self._velocities, np.array([t - self._t]))[0]
         room = self._speed * dt
         # A joint that starts beyond its range comes back at its speed.
         inside = np.clip(wanted, self._lower, self._upper)
         self.q = np.clip(inside, self.q - room, self.q + room)
         return ArmCommand(self.q.copy(), np.zeros(2), np.zeros(2), bool(np.abs(self.q - wanted).max() > 1e-9))
-
-    def _at(self, s: float) -> Array:
-        """Return the joints (15,) of the trajectory `s` [s] after its beginning."""
-        return interpolate(self._times, self._points, self._velocities, np.array([s]))[0]
 
 
 @functools.cache

@@ -189,10 +189,7 @@ class PackedRobot:
 
 
 def run_spheres(config: SpheresConfig) -> PackedRobot:
-    """Pack, print the report and write the file.
-
-    Raises ConfigError: a number is out of range, or the file cannot be read or has no geometry.
-    """
+    """Pack, print the report and write the file. Raises ConfigError: a wrong number, or a file without geometry."""
     if config.file is None:
         name, links = our_robot()
     else:

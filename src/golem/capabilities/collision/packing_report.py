@@ -74,14 +74,8 @@ def coverage(link: str, surface: LinkSurface, packing: Packing, seed: int = 1) -
     low, high = (packing.centres - reach).min(axis=0), (packing.centres + reach).max(axis=0)
     drawn = rng.uniform(low, high, (40000, 3))
     volume = float((packing.gap(drawn) <= 0.0).mean() * np.prod(high - low))
-    return LinkCoverage(
-        link,
-        len(packing.radii),
-        float((gaps <= 0.0).mean()),
-        max(0.0, float(gaps.max())),
-        float(outside.mean()) if len(outside) else 0.0,
-        volume / max(surface.volume, 1e-12),
-    )
+    covered, gap, ratio = float((gaps <= 0.0).mean()), max(0.0, float(gaps.max())), volume / max(surface.volume, 1e-12)
+    return LinkCoverage(link, len(packing.radii), covered, gap, float(outside.mean()) if len(outside) else 0.0, ratio)
 
 
 def score_collisions(

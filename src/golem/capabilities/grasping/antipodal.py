@@ -158,9 +158,7 @@ class Antipodal(OpenLoop):
         width = np.linalg.norm(way, axis=1)
         fits = (width > 0.003) & (width < gripper.max_gap - 2.0 * c.room)
         a, b, way, width = a[fits], b[fits], way[fits] / width[fits, None], width[fits]
-        cosine = np.minimum(
-            np.abs(np.einsum("ij,ij->i", normals[a], way)), np.abs(np.einsum("ij,ij->i", normals[b], way))
-        )
+        cosine = np.abs([np.einsum("ij,ij->i", normals[k], way) for k in (a, b)]).min(axis=0)
         # A closing axis along the approach lets no hand come.
         sideways = np.abs(way @ gripper.approach) < math.sin(c.tilt)
         cone = math.cos(math.atan(c.friction))
@@ -169,9 +167,7 @@ class Antipodal(OpenLoop):
         way, width = way[held], width[held]
         quality = (cosine[held] - cone) / (1.0 - cone) * 0.5 + 0.5
         outline = self._outline_pairs(cloud, gripper, cone)
-        middle, way, width, quality = (
-            np.concatenate(pair) for pair in zip((middle, way, width, quality), outline, strict=True)
-        )
+        middle, way, width, quality = map(np.concatenate, zip((middle, way, width, quality), outline, strict=True))
         # Grasps near the middle of the object hold its weight best, and are seen on both sides.
         off = np.linalg.norm(middle - cloud.mean(axis=0), axis=1) / (float(np.linalg.norm(cloud.std(axis=0))) + 1e-6)
         order = np.argsort(-quality * np.exp(-(off**2)), kind="stable")

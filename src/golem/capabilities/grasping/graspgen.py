@@ -69,10 +69,7 @@ class GraspGen(OpenLoop):
     """
 
     def __init__(self, config: GraspGenConfig | None = None) -> None:
-        """Take the options; the server is asked when a grasp is.
-
-        Raises MissingExtra: the packages it speaks through are not installed.
-        """
+        """Take the options; the server is asked when a grasp is. Raises MissingExtra: a package it needs is absent."""
         self.config = config or GraspGenConfig()
         self.latency = self.config.latency
         _packages()
@@ -101,10 +98,7 @@ class GraspGen(OpenLoop):
         return [Grasp(T[k], gap, float(scores[k])) for k in order]
 
     def ask(self, request: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the server's answer to one request.
-
-        Raises ServiceUnavailable: there is none in time, it is an error, or no map.
-        """
+        """Return the answer to a request. Raises ServiceUnavailable: none in time, an error, or no map."""
         zmq, msgpack = _packages()
         c = self.config
         where = f"The GraspGen server at {c.host}:{c.port}"
@@ -136,10 +130,7 @@ class GraspGen(OpenLoop):
         return fields
 
     def _grasps(self, answer: Mapping[str, Any]) -> tuple[Array, Array]:
-        """Return the poses (n, 4, 4) and confidences (n,) of an answer.
-
-        Raises ServiceUnavailable: they are not there, or no poses.
-        """
+        """Return poses (n, 4, 4) and confidences (n,) of an answer. Raises ServiceUnavailable: they are not there."""
         where = f"The GraspGen server at {self.config.host}:{self.config.port} sent"
         try:
             poses = np.asarray(answer["grasps"], np.float64)
@@ -177,10 +168,7 @@ def _pack_array(value: object) -> object:
 
 
 def _unpack_array(value: dict[Any, Any]) -> object:
-    """Return the array that a map of msgpack-numpy holds; any other map as it is.
-
-    Raises ValueError: it is said to be an array and is none.
-    """
+    """Return the array that a map of msgpack-numpy holds, or another map as it is. Raises ValueError: it is damaged."""
     flag = value.get(b"nd", value.get("nd"))
     if flag is None:
         return value

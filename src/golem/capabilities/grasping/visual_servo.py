@@ -163,10 +163,7 @@ class CentroidServo:
         return ServoStep(goal, self._x.copy(), sigma, status)
 
     def _update(self, t: float, sightings: list[LocalizedObject], start: Array) -> bool:
-        """Fuse the sighting that belongs to the target; return whether there is one in this frame.
-
-        `start` (2,) is where the hand began, in odom [m].
-        """
+        """Fuse the target's sighting; return whether the frame has one. The hand began at `start` (2,) in odom [m]."""
         c = self._config
         candidates = [s for s in sightings if s.label == self.label]
         if not candidates:
@@ -185,7 +182,7 @@ class CentroidServo:
                 if away[k] <= radius
                 and abs(s.position[2] - self._x[2]) <= height
                 and s.detection.score >= least
-                and not self._was_left(s)
+                and not any(np.linalg.norm(s.position[:2] - x) < self._config.left_radius for x in self._left)
             ]
             if not near:
                 return False
@@ -231,10 +228,6 @@ class CentroidServo:
         self._retreats = max(self._config.retreats - 1, 0)
         self._look_again(t)
         return ServoStatus.TRACKING
-
-    def _was_left(self, sighting: LocalizedObject) -> bool:
-        """Return whether a sighting is one of the objects that were left."""
-        return any(np.linalg.norm(sighting.position[:2] - x) < self._config.left_radius for x in self._left)
 
     def _is_tight(self) -> bool:
         """Return whether the object stands as low as one that is screwed down, by the last looks at the ground."""

@@ -57,11 +57,8 @@ class Envelope:
 
     def clamp(self, twist: Twist) -> Twist:
         """Return the nearest twist inside, each component of the velocity by itself, at its own height."""
-        return Twist(
-            min(max(twist.vx, self.vx[0]), self.vx[1]),
-            min(max(twist.vy, self.vy[0]), self.vy[1]),
-            min(max(twist.wz, self.wz[0]), self.wz[1]),
-        )
+        bounds = ((twist.vx, self.vx), (twist.vy, self.vy), (twist.wz, self.wz))
+        return Twist(*(min(max(value, low), high) for value, (low, high) in bounds))
 
 
 @dataclass(frozen=True, slots=True)

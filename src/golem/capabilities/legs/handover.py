@@ -162,7 +162,7 @@ class Handover:
         # Another controller failed while it walked: the walking one ends that, if it is ready.
         found = self._last is None and motion.stepping and not self._is_in_place(base)
         wanted = found or self._other_wanted(motion)
-        may_change = wanted and (found or (self._is_calm(dt) and not self._blend.active))
+        may_change = wanted and (found or (self._healthy > self.config.calm - 0.5 * dt and not self._blend.active))
         if not wanted:
             self._coming = None
         elif self._coming is None and may_change:
@@ -218,10 +218,6 @@ class Handover:
         vx, vy, size = base.velocity[0], base.velocity[1], math.hypot(x, y)
         ahead, sideways = (x * vx + y * vy) / size, (x * vy - y * vx) / size
         return math.hypot(ahead - motion.twist.vx, sideways - motion.twist.vy) > bound
-
-    def _is_calm(self, dt: float) -> bool:
-        """Return whether the robot has been healthy for long enough."""
-        return self._healthy > self.config.calm - 0.5 * dt
 
     def _is_in_place(self, base: BaseEstimate) -> bool:
         """Return whether the base hardly moves over the floor."""

@@ -216,13 +216,8 @@ class ObservationLayout:
         angle = 2.0 * np.pi * s.phase
         runs = s.stepping[..., None]
         # In the order of TERMS.
-        values = np.concatenate(
-            [
-                *(s.velocity, s.gyro, s.gravity, s.twist, s.q, s.dq, s.action),
-                *(np.sin(angle) * runs, np.cos(angle) * runs),
-            ],
-            axis=-1,
-        )
+        turns = (np.sin(angle) * runs, np.cos(angle) * runs)
+        values = np.concatenate([s.velocity, s.gyro, s.gravity, s.twist, s.q, s.dq, s.action, *turns], axis=-1)
         return (values.take(self._columns, axis=-1) - self._offset) * self._scale
 
     def look(self, state: LowState, base: BaseEstimate, motion: LocomotionCommand, action: Array) -> Array:

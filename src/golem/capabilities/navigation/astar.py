@@ -69,17 +69,11 @@ def astar(cost: Array, start: Cell, goal: Cell, beta: float, closed: float) -> t
     """
     rows, columns = cost.shape
     parents = np.full(rows * columns, -1, np.int32)
-    total = _search(
-        np.ascontiguousarray(cost, np.float64),
-        start[0] * columns + start[1],
-        goal[0] * columns + goal[1],
-        float(beta),
-        float(closed),
-        parents,
-    )
+    here, at = start[0] * columns + start[1], goal[0] * columns + goal[1]
+    total = _search(np.ascontiguousarray(cost, np.float64), here, at, float(beta), float(closed), parents)
     if not math.isfinite(total):
         return None
-    at, way = goal[0] * columns + goal[1], []
+    way = []
     while at >= 0:
         way.append(divmod(at, columns))
         at = int(parents[at])

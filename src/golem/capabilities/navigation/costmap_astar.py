@@ -200,7 +200,10 @@ class CostmapAstar:
         if self._near:
             return self._finish(inputs, dt)
         if self._recovering:
-            return self._recover(left, dt)
+            self._twist = ZERO
+            if self._recovery.tick(dt) is not BehaviourStatus.RUNNING:
+                self._recovering, self._marked = False, 0.0
+            return NavStep(self._twist, False, left, None, self._path, "recover")
         self._planned += dt
         if self._way is None or self._planned >= self.config.replan:
             self._plan()
@@ -309,13 +312,6 @@ class CostmapAstar:
             self._recovering, self._blocked = True, 0.0
             self._recovery.reset()
         return NavStep(ZERO, False, left, None, self._path, "blocked")
-
-    def _recover(self, left: PlanarPose, dt: float) -> NavStep:
-        """Go on with the recovery; when it has ended, follow again."""
-        self._twist = ZERO
-        if self._recovery.tick(dt) is not BehaviourStatus.RUNNING:
-            self._recovering, self._marked = False, 0.0
-        return NavStep(self._twist, False, left, None, self._path, "recover")
 
     def _wait(self, since: float) -> BehaviourStatus:
         return BehaviourStatus.SUCCESS if since >= self.config.wait else BehaviourStatus.RUNNING

@@ -170,13 +170,9 @@ class LocalController:
         vy = [share * c.sideways for share in (-1.0, -0.5, 0.0, 0.5, 1.0)]
         wz = [share * c.turn for share in (-1.0, -0.6, -0.3, 0.0, 0.3, 0.6, 1.0)]
         # An ellipse: legs that go at full speed ahead do not go at full speed sideways as well.
-        self._twists: Array = np.array(
-            [
-                t
-                for t in itertools.product(vx, vy, wz)
-                if (t[0] / c.forward) ** 2 + (t[1] / c.sideways) ** 2 < 1.3 and t != (0.0, 0.0, 0.0)
-            ]
-        )
+        every = [t for t in itertools.product(vx, vy, wz) if t != (0.0, 0.0, 0.0)]
+        able = [t for t in every if (t[0] / c.forward) ** 2 + (t[1] / c.sideways) ** 2 < 1.3]
+        self._twists: Array = np.array(able)
 
     def follow(
         self, pose: PlanarPose, way: Way, goal: PlanarPose, footprint: Footprint, around: Around

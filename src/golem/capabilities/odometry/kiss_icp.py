@@ -57,10 +57,6 @@ def _icp(config: KissIcpConfig) -> Any:
         from kiss_icp.config import KISSConfig
         from kiss_icp.config.config import DataConfig, MappingConfig, RegistrationConfig
         from kiss_icp.kiss_icp import KissICP
-    return KissICP(
-        KISSConfig(
-            data=DataConfig(max_range=config.far),
-            mapping=MappingConfig(voxel_size=config.voxel),
-            registration=RegistrationConfig(max_num_threads=config.threads),
-        )
-    )
+    data, mapping = DataConfig(max_range=config.far), MappingConfig(voxel_size=config.voxel)
+    registration = RegistrationConfig(max_num_threads=config.threads)
+    return KissICP(KISSConfig(data=data, mapping=mapping, registration=registration))

@@ -18,10 +18,7 @@ LOST_AFTER = 1.0
 
 
 class ScanPoses(base.Ignores):
-    """An odometry that says one pose per scan: of its end. Between scans it stays what it was.
-
-    A subclass registers scans; see `LidarOdometry` for the rest.
-    """
+    """An odometry that says one pose per scan, of its end, and keeps it until the next; a subclass registers scans."""
 
     why = "No scan has come yet."
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from itertools import pairwise
 
 import numpy as np
 
@@ -48,9 +49,7 @@ class MovingStart:
         T_base_lidar = lidar_in_base(legs.waist)
         R_base_imu = T_base_lidar[:3, :3]
         turned, force = np.eye(3), np.zeros(3)
-        for (one, _), (later, _) in zip(
-            reversed(list(self._window)[:-1]), reversed(list(self._window)[1:]), strict=True
-        ):
+        for (later, _), (one, _) in pairwise(reversed(self._window)):
             force += turned @ later.acc
             turned = turned @ exp(-(later.t - one.t) * later.gyro)
         gained = (R_base_imu.T @ now - turned @ R_base_imu.T @ before) / (sample.t - first.t)

@@ -144,10 +144,7 @@ class ArmPlanner(Protocol):
     latency: float
 
     def plan(self, request: PlanRequest) -> Plan:
-        """Return a trajectory from `request.q` to one of `request.goals`.
-
-        Raises PlanRefused: there is none; `refusal` says why.
-        """
+        """Return a trajectory from `request.q` to one of `request.goals`. Raises PlanRefused: there is none."""
         ...
 
 

@@ -117,7 +117,7 @@ class RrtConnect(PathPlanner):
         for _ in range(self._options.shortcuts):
             if len(path) <= 2 or effort.left <= 0:
                 break
-            at = np.concatenate(([0.0], np.cumsum(self._durations(path))))
+            at = np.concatenate(([0.0], np.cumsum((np.abs(np.diff(path, axis=0)) / self.speed).max(axis=1))))
             s, t = np.sort(rng.uniform(0.0, at[-1], 2))
             i, j = (min(int(np.searchsorted(at, x, side="right")) - 1, len(path) - 2) for x in (s, t))
             if i == j:
@@ -127,10 +127,6 @@ class RrtConnect(PathPlanner):
             if space.free_line(a, b, step):
                 path = _without_repeats(np.concatenate([path[: i + 1], [a, b], path[j + 1 :]]))
         return path
-
-    def _durations(self, path: Array) -> Array:
-        """Return (k - 1,) the least time of each part of a path [s]."""
-        return (np.abs(np.diff(path, axis=0)) / self.speed).max(axis=1)
 
 
 def _branch(nodes: Array, parents: Array, leaf: int) -> Array:

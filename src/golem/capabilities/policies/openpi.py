@@ -138,10 +138,7 @@ def pack_array(value: object) -> object:
 
 
 def unpack_array(value: dict[Any, Any]) -> object:
-    """Return the array or number in a map of openpi_client.msgpack_numpy; any other map as it is.
-
-    Raises ValueError: it is said to be an array and is none.
-    """
+    """Return what a map of openpi_client.msgpack_numpy holds, or another map as it is. Raises ValueError: damaged."""
     if b"__npgeneric__" in value:
         return np.dtype(value[b"dtype"]).type(value[b"data"])
     if b"__ndarray__" not in value:

@@ -80,12 +80,8 @@ def instant(bus: Bus) -> Instant | None:
     state, base = bus.latest(topics.LOW_STATE), bus.latest(topics.BASE)
     if state is None or base is None:
         return None
-    hands: dict[Side, HandState] = {
-        side: hand for side in SIDES if (hand := bus.latest(topics.hand_state(side))) is not None
-    }
-    grips: dict[Side, HandCommand] = {
-        side: grip for side in SIDES if (grip := bus.latest(topics.hand_command(side))) is not None
-    }
+    hands: dict[Side, HandState] = {s: hand for s in SIDES if (hand := bus.latest(topics.hand_state(s))) is not None}
+    grips: dict[Side, HandCommand] = {s: got for s in SIDES if (got := bus.latest(topics.hand_command(s))) is not None}
     legs = bus.latest(topics.LEG_STATUS)
     command = bus.latest(topics.LOW_CMD)
     return Instant(state, base, hands, command, grips, Twist() if legs is None else legs.commanded)

@@ -82,10 +82,7 @@ def points(strata: Strata, gains: Mapping[Any, float], compared: int = 1) -> Poi
 
 def _mover(cells: Sequence[tuple[float, float]], level: float) -> Interval:
     (p, _), (q, _) = cells
-    ends = [
-        wilson(share * units, units, level) if 0.0 < units < math.inf else Interval(0.0, float(units == 0.0))
-        for share, units in cells
-    ]
+    ends = [wilson(share * u, u, level) if 0.0 < u < math.inf else Interval(0.0, float(u == 0.0)) for share, u in cells]
     product = (1.0 - p) * (1.0 - q)
     r = -math.sqrt(p * q / product) if product > 0.0 else 0.0
 

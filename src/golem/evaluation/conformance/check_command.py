@@ -64,16 +64,12 @@ def run_check(config: CheckConfig) -> bool:
         reports.append(report)
         if not config.json:
             _print(console, report, whole=bool(config.use))
-    _keep(reports, config)
-    return all(report.passed or report.lacks is not None for report in reports)
-
-
-def _keep(reports: list[Report], config: CheckConfig) -> None:
-    text = json.dumps([asdict(report) | {"passed": report.passed} for report in reports], indent=2)
+    text = json.dumps([asdict(one) | {"passed": one.passed} for one in reports], indent=2)
     if config.json:
         print(text)
     if config.save is not None:
         write_file(config.save, text + "\n")
+    return all(report.passed or report.lacks is not None for report in reports)
 
 
 @contextmanager

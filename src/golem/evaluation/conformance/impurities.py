@@ -37,9 +37,7 @@ _WATCHED: dict[str, dict[str, set[str]]] = {
     THREAD: {"_thread": {"start_new_thread", "start_joinable_thread"}, "posix": {"fork", "forkpty"}},
     RANDOM: {"posix": {"urandom"}},
 }
-_FUNCTIONS = {
-    (module, name): kind for kind, modules in _WATCHED.items() for module, names in modules.items() for name in names
-}
+_FUNCTIONS = {(module, name): kind for kind, of in _WATCHED.items() for module, names in of.items() for name in names}
 _PACKAGES = tuple({f"{sysconfig.get_path(name)}/" for name in ("purelib", "platlib")})
 _METHODS = {(datetime.datetime, name): CLOCK for name in ("now", "utcnow")} | {(datetime.date, "today"): CLOCK}
 

@@ -21,7 +21,7 @@ from golem.robots.model.table import JOINT_INDEX, JOINT_NAMES
 from golem.robots.sensors.calibration import OPTICAL_FRAMES
 from golem.robots.sensors.cameras import project
 from golem.runtime.lockstep import start_posture
-from golem.types import GRAVITY, NUM_JOINTS, SIDES, UPPER, Array, CameraInfo, LowState, Side
+from golem.types import GRAVITY, NUM_JOINTS, SIDES, UPPER, Array, CameraInfo, LowState
 
 ALONG = (0.0, 0.05, 0.1, 0.15, 0.2, 0.85, 0.9, 0.95)
 """Where on the way from the wrist to the grasp frame the arm is solid; between them one can look through the hand."""
@@ -290,18 +290,15 @@ class RobotMeasures:
         with self.rig(candidate) as rig:
             for side in SIDES:
                 for gap in GAPS:
-                    self._opening(candidate, rig, side, gap)
+                    found = rig.grip(side, gap, PRESSED, GRIP_TIME).gap
+                    candidate.figures[f"{side}: gap of {gap:g} m [m]"] = found
+                    if abs(found - gap) > GAP_ERROR:
+                        raise candidate.fault(f"the {side} hand was sent to {gap} m and reports {found:.4f}")
                 force = float(rig.grip(side, 0.0, PRESSED, GRIP_TIME).force.mean())
                 rig.grip(side, OPEN, PRESSED, 1.0)
                 candidate.figures[f"{side}: force of {PRESSED:g} N [N]"] = force
                 if abs(force - PRESSED) > GRIP_ERROR * PRESSED:
                     raise candidate.fault(f"the {side} fingers were to press with {PRESSED} N and report {force:.2f}")
-
-    def _opening(self, candidate: Candidate, rig: RobotRig, side: Side, gap: float) -> None:
-        found = rig.grip(side, gap, PRESSED, GRIP_TIME).gap
-        candidate.figures[f"{side}: gap of {gap:g} m [m]"] = found
-        if abs(found - gap) > GAP_ERROR:
-            raise candidate.fault(f"the {side} hand was sent to {gap} m and reports {found:.4f}")
 
 
 def between(a: Array, b: Array, seconds: float) -> Path:

@@ -45,11 +45,9 @@ def state(t: float, q: Array | None = None, **changes: Array) -> LowState:
     """Return what a standing robot reports at `t` [s], with other `q`, `dq`, `tau`, `quat`, `gyro` or `acc`."""
     phase = 2.0 * np.pi * (0.7 * t + np.arange(NUM_JOINTS) / NUM_JOINTS)
     arrays = {"dq": 0.02 * np.cos(phase), "tau": np.sin(phase)} | changes
-    imu = Imu(
-        arrays.pop("quat", tilt(0.01 * np.sin(4.0 * t))),
-        arrays.pop("gyro", np.array([0.0, 0.04 * np.cos(4.0 * t), 0.0])),
-        arrays.pop("acc", np.array([0.1, 0.0, 9.81])),
-    )
+    quat, gyro = tilt(0.01 * np.sin(4.0 * t)), np.array([0.0, 0.04 * np.cos(4.0 * t), 0.0])
+    own = (("quat", quat), ("gyro", gyro), ("acc", np.array([0.1, 0.0, 9.81])))
+    imu = Imu(*(arrays.pop(name, value) for name, value in own))
     return LowState(t, posture() + 0.005 * np.sin(phase) if q is None else q, arrays["dq"], arrays["tau"], imu)
 
 

@@ -41,10 +41,7 @@ class ServoSuite(Suite):
     def edges(self) -> Mapping[str, Sequence[ServoInput]]:
         """Return robots at the edges of their range, and one on its legs."""
         times = [TICK * (i + 1) for i in range(5)]
-        held = {
-            what: [ServoInput(make(t), samples.posture()) for t in times]
-            for what, make in samples.edge_states().items()
-        }
+        held = {w: [ServoInput(make(t), samples.posture()) for t in times] for w, make in samples.edge_states().items()}
         legs = LEGS.stop
         gains, tau = (np.full(legs, 200.0), np.full(legs, 4.0)), np.full(legs, 10.0)
         standing = [ServoInput(samples.state(t), samples.posture(), gains, tau) for t in times]

@@ -133,9 +133,7 @@ class CounterWatch(ErrandWatch):
 
     def _lifted(self) -> list[int]:
         return [
-            k
-            for k, thing in enumerate(self._before)
-            if thing.kind == self._kind and self._highest[k] > thing.position[2] + LIFTED
+            k for k, t in enumerate(self._before) if t.kind == self._kind and self._highest[k] > t.position[2] + LIFTED
         ]
 
     def _things(self) -> list[StandingOne]:

@@ -208,13 +208,9 @@ class LastSeconds:
                     (6, picture.height + 2), "\n".join((title, *said)), fill=INK, font=font, spacing=2
                 )
                 frames.append(image)
-        return _packed(frames)
-
-
-def _packed(frames: list[Image.Image]) -> bytes:
-    stream = io.BytesIO()
-    frames[0].save(
-        stream, "WEBP", save_all=True, append_images=frames[1:], duration=round(1000 / FPS), loop=0, method=2,
-        quality=QUALITY,
-    )  # fmt: skip
-    return stream.getvalue()
+        stream = io.BytesIO()
+        frames[0].save(
+            stream, "WEBP", save_all=True, append_images=frames[1:], duration=round(1000 / FPS), loop=0, method=2,
+            quality=QUALITY,
+        )  # fmt: skip
+        return stream.getvalue()

@@ -187,10 +187,8 @@ class Oracle:
         found = []
         for slot in layout.reachable(0.5 * layout.size_y):
             if slot not in layout.empty_holes or slot in loose:
-                world = layout.pose() @ (*spots[slot], 1.0)
-                found.append(
-                    Fastener((self._T_odom_world @ world)[:3], (T_base_world @ world)[:3], slot in loose, slot)
-                )
+                at = layout.pose() @ (*spots[slot], 1.0)
+                found.append(Fastener((self._T_odom_world @ at)[:3], (T_base_world @ at)[:3], slot in loose, slot))
         return found
 
     def taken(self, fasteners: Sequence[Fastener]) -> set[int]:

@@ -96,12 +96,8 @@ class PlainRobot:
     def state(self) -> LowState:
         """Return the true joints, and what a torso IMU without acceleration would report."""
         q, dq, tau = self._motors.measure(self._data)
-        quat, gyro = torso_motion(
-            self._data.qpos[self._q + 3 : self._q + 7],
-            self._data.qvel[self._v + 3 : self._v + 6],
-            float(q[TORSO]),
-            float(dq[TORSO]),
-        )
+        base, rate = self._data.qpos[self._q + 3 : self._q + 7], self._data.qvel[self._v + 3 : self._v + 6]
+        quat, gyro = torso_motion(base, rate, float(q[TORSO]), float(dq[TORSO]))
         R = np.empty(9)
         mujoco.mju_quat2Mat(R, quat)
         return LowState(self.t, q, dq, tau, Imu(quat, gyro, _UP @ R.reshape(3, 3)))

@@ -19,12 +19,6 @@ from golem.robots.model.table import JOINT_INDEX
 from golem.types import NUM_JOINTS
 
 
-def combined_faults() -> Iterator[Injection]:
-    """Yield every one of them."""
-    yield from _two_at_once()
-    yield from _while_stopped()
-
-
 def _knee(field: str, value: int) -> dict[str, Any]:
     return {"state": by_state(set_to(value, "motor", field, KNEE))}
 
@@ -110,14 +104,6 @@ def _while_stopped() -> Iterator[Injection]:
     )
 
 
-def device_faults() -> Iterator[Injection]:
-    """Yield every fault of devices and processes."""
-    yield from _motors()
-    yield from _estop()
-    yield from _writers()
-    yield from _gate()
-
-
 def _stop(name: str, reasons: tuple[Reason, ...], within: float = 0.006, **more: Any) -> Injection:
     return Injection(name, FaultSource.DEVICE, Expect.STOP, reasons, within, **more)
 
@@ -189,7 +175,6 @@ def _gate() -> Iterator[Injection]:
         yield _stop(f"gate's clock {seconds:+g} s", (Reason.STALLED,), gate=shifted(seconds))
 
 
-FAULTS: dict[str, Injection] = {
-    fault.name: fault
-    for fault in chain(command_faults(), data_faults(), device_faults(), class_faults(), combined_faults())
-}
+_DEVICES = (_motors(), _estop(), _writers(), _gate())
+_ALL = chain(command_faults(), data_faults(), *_DEVICES, class_faults(), _two_at_once(), _while_stopped())
+FAULTS: dict[str, Injection] = {fault.name: fault for fault in _ALL}

@@ -63,15 +63,8 @@ def _limp() -> Iterator[Injection]:
     }
     for part, where in PARTS.items():
         for name, (fields, share, kd) in kinds.items():
-            yield Injection(
-                f"{name}: {part}",
-                FaultSource.COMMAND,
-                Expect.SAFE,
-                BALANCE,
-                lasting=7.0 if "5 s" in name else 1.5,
-                stands=True,
-                command=by_command(scaled(fields, where, share, kd)),
-            )
+            rest = {"lasting": 7.0 if "5 s" in name else 1.5, "command": by_command(scaled(fields, where, share, kd))}
+            yield Injection(f"{name}: {part}", FaultSource.COMMAND, Expect.SAFE, BALANCE, stands=True, **rest)
 
 
 def _senders() -> Iterator[Injection]:
@@ -150,11 +143,8 @@ def _lies() -> Iterator[Injection]:
         yield lie(f"{name} frozen, noise in the last digit", lambda m, s, i=imu, j=joints: alive(m, s, i, j))
     for axis, word in enumerate(("roll", "pitch", "yaw")):
         for rate in (0.02, 0.03, -0.05, 0.1):
-            yield lie(
-                f"{word} drifts by {rate:g} rad/s",
-                by_imu(lambda m, u, a=axis, r=rate: replace(u, quat=turned(a, r * m.t, u.quat))),
-                9.0,
-            )
+            drift = by_imu(lambda m, u, a=axis, r=rate: replace(u, quat=turned(a, r * m.t, u.quat)))
+            yield lie(f"{word} drifts by {rate:g} rad/s", drift, 9.0)
         for gain in (-1.0, 0.5):
             scale = np.where(np.arange(3) == axis, gain, 1.0)
             yield lie(f"gyro's {word} rate times {gain:g}", by_imu(lambda m, u, k=scale: replace(u, gyro=u.gyro * k)))
@@ -209,23 +199,13 @@ def _gate() -> Iterator[Injection]:
         yield Injection(
             f"gate at {500 // ticks} Hz", FaultSource.DEVICE, Expect.BEAR, lasting=4.0, stands=True, gate=slow(ticks)
         )
-        yield Injection(
-            f"state: 1 of {ticks} arrives",
-            FaultSource.DATA,
-            Expect.BEAR,
-            lasting=4.0,
-            stands=True,
-            state=lambda m, p, n=ticks: [] if m.k % n else [p],
-        )
+        some, name = lambda m, p, n=ticks: [] if m.k % n else [p], f"state: 1 of {ticks} arrives"
+        yield Injection(name, FaultSource.DATA, Expect.BEAR, lasting=4.0, stands=True, state=some)
     yield Injection(
         "no base estimate", FaultSource.DEVICE, Expect.SAFE, (Reason.BASE_STALE,), stands=True, gate=no_estimate
     )
 
     for share in (0.15, 0.5):
-        yield Injection(
-            f"a knee gives {100 * share:g} % of its torque",
-            FaultSource.DEVICE,
-            Expect.SAFE,
-            (*LIMITS, Reason.MOTOR_DEAD, Reason.BALANCE),
-            motors=weak(KNEE, lambda m, s=share: s),
-        )
+        name, reasons = f"a knee gives {100 * share:g} % of its torque", (*LIMITS, Reason.MOTOR_DEAD, Reason.BALANCE)
+        feeble = weak(KNEE, lambda m, s=share: s)
+        yield Injection(name, FaultSource.DEVICE, Expect.SAFE, reasons, motors=feeble)

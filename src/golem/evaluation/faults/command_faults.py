@@ -108,12 +108,8 @@ def _motion() -> Iterator[Injection]:
     """Commands that any motor obeys, and that nobody should give."""
     for part, where in PARTS.items():
         yield _safe(f"tau 1000 of {part}", command=_set("tau", where, 1e3))
-        yield _stop(
-            f"tau +-1000 each tick of {part}",
-            (*SENDER, *LIMITS),
-            0.02,
-            command=_set("tau", where, lambda m: 1e3 * (-1) ** m.k),
-        )
+        shaken = _set("tau", where, lambda m: 1e3 * (-1) ** m.k)
+        yield _stop(f"tau +-1000 each tick of {part}", (*SENDER, *LIMITS), 0.02, command=shaken)
         yield _safe(f"tau +-1000 at 10 Hz of {part}", command=_set("tau", where, lambda m: 1e3 * (-1) ** (m.k // 25)))
         full = TORQUE[where]
         yield _safe(f"tau at its limit of {part}", command=_set("tau", where, full))

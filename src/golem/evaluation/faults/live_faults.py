@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import os
 import re
-import signal
 import time
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass, field
+from signal import SIGCONT, SIGKILL, SIGSTOP, Signals
 
 import numpy as np
 from tyro.conf import OmitArgPrefixes
@@ -66,7 +66,7 @@ class LiveRobot:
     def __init__(self, participant: CycloneParticipant, link: RobotLink, dds: DdsConfig) -> None:
         self._participant, self.link, self._dds = participant, link, dds
 
-    def kill(self, name: str, number: signal.Signals) -> None:
+    def kill(self, name: str, number: Signals) -> None:
         """Send a signal to one of its processes. Raises GolemError: there is none of that name."""
         for found in discovery.members(self._participant):
             who = owner(self._participant, found.guid)
@@ -145,21 +145,15 @@ FAULTS: tuple[LiveFault, ...] = (
     ),
     LiveFault(
         "stack stopped",
-        lambda r: r.kill("up", signal.SIGSTOP),
+        lambda r: r.kill("up", SIGSTOP),
         frozenset({Reason.COMMAND_STALE}),
-        lambda r: r.kill("up", signal.SIGCONT),
+        lambda r: r.kill("up", SIGCONT),
     ),
     LiveFault(
-        "stack killed",
-        lambda r: r.kill("up", signal.SIGKILL),
-        frozenset({Reason.COMMAND_STALE}),
-        lambda r: r.restart("up"),
+        "stack killed", lambda r: r.kill("up", SIGKILL), frozenset({Reason.COMMAND_STALE}), lambda r: r.restart("up")
     ),
     LiveFault(
-        "twin killed",
-        lambda r: r.kill("twin", signal.SIGKILL),
-        frozenset({Reason.STATE_STALE}),
-        lambda r: r.restart("twin"),
+        "twin killed", lambda r: r.kill("twin", SIGKILL), frozenset({Reason.STATE_STALE}), lambda r: r.restart("twin")
     ),
 )
 """What is tried, in this order; after them the gate is killed."""
@@ -212,7 +206,7 @@ def _gate_killed(robot: LiveRobot) -> bool:
     """Kill the gate; return whether the arms then sank damped."""
     if not robot.activate():
         return False
-    robot.kill("safety", signal.SIGKILL)
+    robot.kill("safety", SIGKILL)
     heard = robot.link.listen(3.0)
     fastest = max((float(np.abs(state.dq).max()) for _, state in heard), default=np.inf)
     right = fastest < DAMPED

@@ -188,13 +188,9 @@ class FaultRig:
         limits = SafetyLimits.from_profile(stack.limits)
         if not robot.living:
             limits = limits.still()
+        node, standing = RosNode(safety, "safety"), StandingLegs if stack.on_ground else None
         self.gate = SafetyProcess(
-            safety,
-            RosNode(safety, "safety"),
-            limits,
-            self.estop,
-            clock=lambda: 1000.0 + self.t + self.clock,
-            standing=StandingLegs if stack.on_ground else None,
+            safety, node, limits, self.estop, clock=lambda: 1000.0 + self.t + self.clock, standing=standing
         )
         self.states, self.commands = (self.writer(name) for name in ("/lowstate", "/safety/lowcmd_in"))
         row = public.topic("/lowcmd")

@@ -156,13 +156,9 @@ class _Worker:
         ours, its = socket.socketpair()
         with its:
             command = [sys.executable, "-P", "-m", "golem.evaluation.harness.worker"]
-            self._process = subprocess.Popen(
-                [*command, str(its.fileno()), str(self._report.fileno())],
-                env={**os.environ, **SINGLE_THREAD},
-                stdin=subprocess.DEVNULL,
-                pass_fds=(its.fileno(), self._report.fileno()),
-                start_new_session=True,
-            )
+            ends, env, null = (its.fileno(), self._report.fileno()), {**os.environ, **SINGLE_THREAD}, subprocess.DEVNULL
+            command += map(str, ends)
+            self._process = subprocess.Popen(command, env=env, stdin=null, pass_fds=ends, start_new_session=True)
         self._connection = Connection(ours.detach())
         self.signs: list[Connection | int] = [self._connection]
         if CAN_COPY:  # a copy of it would hold the connection open

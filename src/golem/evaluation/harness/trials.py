@@ -56,13 +56,6 @@ def culprit(frames: list[tuple[FrameType, int]]) -> Culprit:
     return Culprit(module, "".join(stack.format()), f"{last.filename}, line {last.lineno}, in {last.name}")
 
 
-def culprit_of(error: BaseException) -> Culprit:
-    """Return who raised `error`, which was caught."""
-    found = culprit(list(traceback.walk_tb(error.__traceback__)))
-    last = "".join(traceback.format_exception_only(error))
-    return Culprit(found.module, f"Traceback (most recent call last):\n{found.trace}{last}", found.place)
-
-
 def culprit_at(frame: FrameType) -> Culprit:
     """Return who is in control of the thread whose innermost frame is `frame`."""
     return culprit(list(traceback.walk_stack(frame))[::-1])
@@ -240,7 +233,9 @@ def run_trial(
     except ModuleFault as fault:
         return TrialOutcome(False, FAULT, f"{fault.slot}: {fault.use}", fault.reason, trace=fault.trace)
     except leaving as error:
-        by = culprit_of(error)
+        found = culprit(list(traceback.walk_tb(error.__traceback__)))
+        last = "".join(traceback.format_exception_only(error))
+        by = Culprit(found.module, f"Traceback (most recent call last):\n{found.trace}{last}", found.place)
         what = ": ".join(part for part in (type(error).__name__, str(error)) if part)
         return TrialOutcome(False, FAULT, by.module, f"{what} ({by.place})", trace=by.trace)
 

@@ -112,9 +112,7 @@ def unpaired_evidence(a: ArrayLike, b: ArrayLike) -> Array:
     first, second = np.asarray(a, np.float64), np.asarray(b, np.float64)
     rates = [_learnt(side) for side in (first, second)]
     middle = (rates[0] + rates[1]) / 2.0
-    steps = [
-        _log_chance(side, rate) - _log_chance(side, middle) for side, rate in zip((first, second), rates, strict=True)
-    ]
+    steps = [_log_chance(side, p) - _log_chance(side, middle) for side, p in zip((first, second), rates, strict=True)]
     return np.cumsum(steps[0] + steps[1], axis=-1)
 
 

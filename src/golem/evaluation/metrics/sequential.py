@@ -176,14 +176,9 @@ def sequential_tables(rates: Mapping[str, Array], found: Sequence[Decision], rul
             )
             for d in found
         ]
-        tables.append(
-            TextTable(
-                "Comparison at any time",
-                ("pair", "pairs", "difference [points]", "p", "Holm-adjusted p", "verdict"),
-                tuple(lines),
-                f"By e-processes, valid after every trial; equal: within {100 * rule.margin:g} points.",
-            )
-        )
+        columns = ("pair", "pairs", "difference [points]", "p", "Holm-adjusted p", "verdict")
+        note = f"By e-processes, valid after every trial; equal: within {100 * rule.margin:g} points."
+        tables.append(TextTable("Comparison at any time", columns, tuple(lines), note))
     return tables
 
 

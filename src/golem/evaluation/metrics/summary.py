@@ -220,10 +220,8 @@ def comparisons_of(pairs: Sequence[tuple[Sequence[TrialRecord], Sequence[TrialRe
     tables = [stats.PairedTable.count([r.success for r in a], [r.success for r in b]) for a, b in pairs]
     ps = [stats.mcnemar(table) for table in tables]
     return tuple(
-        Comparison(
-            a[0].method, b[0].method, a[0].case, table, stats.paired_difference(table), p, adjusted, _paired(a, b)
-        )
-        for (a, b), table, p, adjusted in zip(pairs, tables, ps, stats.holm(ps), strict=True)
+        Comparison(a[0].method, b[0].method, a[0].case, t, stats.paired_difference(t), p, adjusted, _paired(a, b))
+        for (a, b), t, p, adjusted in zip(pairs, tables, ps, stats.holm(ps), strict=True)
     )
 
 
@@ -232,15 +230,8 @@ def row(records: Sequence[TrialRecord], costs: Sequence[Mapping[str, Any]] = ())
     lost = [r for r in records if not r.success]
     successes = len(records) - len(lost)
     indices = {r.index for r in records}
-    timed = [
-        {
-            name: value
-            for name, value in line.items()
-            if name not in ("method", "case", "index", "wall", "cpu", "active", "stops")
-        }
-        for line in costs
-        if line["index"] in indices
-    ]
+    rest = ("method", "case", "index", "wall", "cpu", "active", "stops")
+    timed = [{k: v for k, v in line.items() if k not in rest} for line in costs if line["index"] in indices]
     return MethodSummary(
         records[0].method,
         records[0].case,
@@ -257,17 +248,13 @@ def row(records: Sequence[TrialRecord], costs: Sequence[Mapping[str, Any]] = ())
 
 def _distributions(rows: Sequence[Mapping[str, float]]) -> dict[str, stats.Distribution]:
     names = sorted({name for row in rows for name in row})
-    found = {
-        name: stats.distribution([row[name] for row in rows if name in row], *metric(name).bounds) for name in names
-    }
+    found = {name: stats.distribution([r[name] for r in rows if name in r], *metric(name).bounds) for name in names}
     return {name: d for name, d in found.items() if d is not None}
 
 
 def _paired(a: Sequence[TrialRecord], b: Sequence[TrialRecord]) -> dict[str, PairedMean]:
     found: dict[str, PairedMean] = {}
-    sides = [
-        ({**one.series, **one.timings}, {**other.series, **other.timings}) for one, other in zip(a, b, strict=True)
-    ]
+    sides = [({**x.series, **x.timings}, {**y.series, **y.timings}) for x, y in zip(a, b, strict=True)]
     for name in sorted({name for one, _ in sides for name in one}):
         pairs = [(one[name], other[name]) for one, other in sides if name in one and name in other]
         differences = [first - second for first, second in pairs]
@@ -276,9 +263,7 @@ def _paired(a: Sequence[TrialRecord], b: Sequence[TrialRecord]) -> dict[str, Pai
         share = metric(name).share
         if share and {value for pair in pairs for value in pair} <= {0.0, 1.0}:
             first, second = zip(*pairs, strict=True)
-            interval = stats.paired_difference(
-                stats.PairedTable.count(*([x == 1.0 for x in side] for side in (first, second)))
-            )
+            interval = stats.paired_difference(stats.PairedTable.count(*([x == 1 for x in s] for s in (first, second))))
         else:
             interval = stats.mean_interval(differences, *((-1.0, 1.0) if share else ()))
         found[name] = PairedMean(len(pairs), sum(differences) / len(pairs), interval)

@@ -33,19 +33,12 @@ class TextTable:
 
     def markdown(self) -> str:
         """Return the table in Markdown, padded so that it can be read as it is."""
-        lines = [
-            tuple(cell.replace("|", "\\|").replace("\n", " ") for cell in line) for line in (self.columns, *self.rows)
-        ]
+        lines = [tuple(c.replace("|", "\\|").replace("\n", " ") for c in row) for row in (self.columns, *self.rows)]
         widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
         figures = self.figures
-        rule = tuple(
-            "-" * (width + 1) + (":" if figure else "-") for width, figure in zip(widths, figures, strict=True)
-        )
+        rule = tuple("-" * (w + 1) + (":" if right else "-") for w, right in zip(widths, figures, strict=True))
         padded = [
-            " | ".join(
-                cell.rjust(width) if figure else cell.ljust(width)
-                for cell, width, figure in zip(line, widths, figures, strict=True)
-            )
+            " | ".join(c.rjust(w) if figure else c.ljust(w) for c, w, figure in zip(line, widths, figures, strict=True))
             for line in lines
         ]
         body = [f"| {padded[0]} |", f"|{'|'.join(rule)}|", *(f"| {line} |" for line in padded[1:])]
@@ -72,14 +65,14 @@ class TextTable:
 
     def latex(self) -> str:
         """Return the table in LaTeX, for the package booktabs; title and note are its caption."""
-        spec = "".join("r" if figure else "l" for figure in self.figures)
+        of = "".join("r" if figure else "l" for figure in self.figures)
         head, *rows = (" & ".join(map(_latex, line)) + r" \\" for line in (self.columns, *self.rows))
         caption = _latex(" ".join(filter(None, (self.title and f"{self.title}.", self.note))))
         lines = [
             r"\begin{table}",
             r"\centering",
             rf"\caption{{{caption}}}" if caption else "",
-            rf"\begin{{tabular}}{{{spec}}}",
+            rf"\begin{{tabular}}{{{of}}}",
         ]
         lines += [r"\toprule", head, r"\midrule", *rows, r"\bottomrule", r"\end{tabular}", r"\end{table}"]
         return "\n".join(line for line in lines if line)

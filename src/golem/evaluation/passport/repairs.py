@@ -193,18 +193,12 @@ def _actions(d: Description) -> Iterator[Repair]:
         yield Repair("scale", "action.scale", f"actions are {f:g} times as large", replace(d, action=turned))
     if d.action.clip < 20.0 or d.action.targets:
         free = replace(d.action, clip=100.0, targets=())
-        yield Repair(
-            "clip",
-            "action.targets" if d.action.targets else "action.clip",
-            "actions are not clipped",
-            replace(d, action=free),
-        )
+        field = "action.targets" if d.action.targets else "action.clip"
+        yield Repair("clip", field, "actions are not clipped", replace(d, action=free))
     q = d.q0()
     flipped = q.copy()
     flipped[LEGS] *= -1.0
-    postures = {said: np.tile(np.array(values, np.float64), 2) for said, values in POSTURES.items()} | {
-        "the negative": flipped[LEGS]
-    }
+    postures = {s: np.tile(np.array(v, np.float64), 2) for s, v in POSTURES.items()} | {"the negative": flipped[LEGS]}
     for said, legs in postures.items():
         q[LEGS] = legs
         yield Repair("offset", "posture", f"the default posture is {said}", replace(d, posture=tuple(q.tolist())))
@@ -233,12 +227,8 @@ def _clock(d: Description) -> Iterator[Repair]:
         return
     for period in PERIODS:
         if abs(period - d.gait.period) > 0.01:
-            yield Repair(
-                "clock phase",
-                "gait",
-                f"the clock's period is {period:g} s",
-                replace(d, gait=replace(d.gait, period=period)),
-            )
+            gait = replace(d.gait, period=period)
+            yield Repair("clock phase", "gait", f"the clock's period is {period:g} s", replace(d, gait=gait))
     other = {"left": "right", "right": "left", "sin": "cos", "cos": "sin"}
     changes = {"sine and cosine are exchanged": ("sin", "cos"), "left and right are exchanged": ("left", "right")}
     for said, words in changes.items():

@@ -177,9 +177,7 @@ def render(result: LadderResult) -> str:
             comparisons=[table for table in (all_cases(summary), comparisons(summary)) if table],
             paper=any((first.rung, method) in PAPER for method in summary.methods),
             map={} if rung.adaptive else _map(records, summary),
-            failure_plots=[
-                (f"by {kind[:-1]}", failure_plot(summary, kind)) for kind in ("stages", "modules") if failed
-            ],
+            failure_plots=[(f"by {k[:-1]}", failure_plot(summary, k)) for k in ("stages", "modules") if failed],
             adaptive=rung.adaptive,
             time_plots=[(name.replace("_", " "), time_plot(name, grouped)) for name in times],
             metrics=[] if rung.adaptive else [t for t in (metrics(summary), metric_differences(summary)) if t],
@@ -219,12 +217,8 @@ def _films(lost: Sequence[TrialRecord], folder: Path) -> list[dict[str, str]]:
         seen[r.method, r.stage] += 1
     chosen = sorted(range(len(filmed)), key=lambda k: turns[k])[:MAX_FILMS]
     return [
-        {
-            "method": filmed[k][0].method,
-            "says": _says(filmed[k][0]),
-            "data": base64.b64encode(filmed[k][1].read_bytes()).decode(),
-        }
-        for k in sorted(chosen)
+        {"method": r.method, "says": _says(r), "data": base64.b64encode(path.read_bytes()).decode()}
+        for r, path in (filmed[k] for k in sorted(chosen))
     ]
 
 
@@ -243,9 +237,7 @@ def _margins(grouped: Mapping[str, Sequence[TrialRecord]], folder: Path) -> tupl
     plots, boxes, short = list[tuple[str, str]](), list[margins.MarginBox](), short_names(grouped)
     for i, (method, rows) in enumerate(grouped.items()):
         kept = margins.kept_traces(rows, folder)
-        plot = margins.margin_plot(
-            [margins.MarginCurve(trace, r.success) for r, trace in kept[: margins.MAX_CURVES]], i
-        )
+        plot = margins.margin_plot([margins.MarginCurve(t, r.success) for r, t in kept[: margins.MAX_CURVES]], i)
         if plot:
             plots.append((short[method], plot))
         box = margins.margin_box(short[method], [trace for _, trace in kept], i)

@@ -34,10 +34,7 @@ SITE = "golem-site.json"
 
 @dataclass(frozen=True)
 class PublishConfig:
-    """Write a static site: a leaderboard per cell, a page per method and per trial, and the data.
-
-    It opens from its file, without a server or a network.
-    """
+    """Write a static site that needs no server: leaderboards per cell, a page per method and per trial, the data."""
 
     folders: Positional[tuple[Path, ...]]
     """Folders of golem study, or of golem ladder, all of one state of the code."""
@@ -178,9 +175,7 @@ def _trial(r: TrialRecord, cell: CellResult, folder: Path) -> dict[str, Any]:
             {"name": metric(name).label, "share": round(100 * t / longest, 1), "text": f"{t:.1f} s"}
             for name, t in sorted(r.timings.items(), key=lambda item: item[1])
         ],
-        "figures": {
-            metric(name).label: f"{number(value, metric(name))} {metric(name).unit}" for name, value in r.series.items()
-        },
+        "figures": {metric(k).label: f"{number(value, metric(k))} {metric(k).unit}" for k, value in r.series.items()},
         "command": f"{read_facts(cell.folder).get('command', '')} --show {trial_name(r)}",
     }
 

@@ -175,11 +175,8 @@ def slipping(walk: RecordedWalk, rng: np.random.Generator) -> list[LowState]:
         legs.update(state.q[LEGS], state.dq[LEGS])
         slide = np.zeros(6)
         slide[:3] = walk.T[i, :3, :3].T @ (-SLIP * walk.velocity[i] * (1.0, 1.0, 0.0))
-        speed = np.where(
-            (walk.forces[i] > LOADED)[:, None],
-            np.array([np.linalg.lstsq(J, slide, rcond=1e-3)[0] for J in legs.jacobians]),
-            -offset / RETURN,
-        )
+        sliding = np.array([np.linalg.lstsq(J, slide, rcond=1e-3)[0] for J in legs.jacobians])
+        speed = np.where((walk.forces[i] > LOADED)[:, None], sliding, -offset / RETURN)
         offset = offset + speed * TICK
         q, dq = state.q.copy(), state.dq.copy()
         q[LEGS] += offset.ravel()
@@ -239,15 +236,12 @@ class BaseEstimation(Rung[BaseEstimationOptions]):
     def run_together(self, specs: Sequence[TrialSpec]) -> Sequence[TrialOutcome]:
         """Record one walk, and let estimators follow it."""
         spec = specs[0]
-        walk = self._record(spec)
+        stack = legs_stack(self.options.legs, spec.profile, spec.overrides)
+        episode = Episode(stack, episode_seed(spec.seed, spec.index), self.onlooker)
+        walk = record(episode, spec, pushed=spec.case["condition"] == PUSHED)
         if not walk.judged.any():
             raise GolemError(f"{self.options.legs} did not stand for a second: {walk.lost or 'it hung in its band'}")
         return [follow(spec, walk) for spec in specs]
-
-    def _record(self, spec: TrialSpec) -> RecordedWalk:
-        stack = legs_stack(self.options.legs, spec.profile, spec.overrides)
-        episode = Episode(stack, episode_seed(spec.seed, spec.index), self.onlooker)
-        return record(episode, spec, pushed=spec.case["condition"] == PUSHED)
 
 
 def follow(spec: TrialSpec, walk: RecordedWalk) -> TrialOutcome:

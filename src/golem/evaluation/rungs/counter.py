@@ -103,9 +103,7 @@ class CounterRung(KitchenRung[CounterOptions]):
         """Return whether the thing of a case stands where its hand is not asked to go."""
         kind, hand = spec.case.get("thing"), spec.case.get("hand")
         sign = 1.0 if hand == "left" else -1.0
-        return hand is not None and any(
-            sign * thing.position[1] < -ACROSS for thing in kitchen.things if thing.kind == kind
-        )
+        return hand is not None and any(sign * t.position[1] < -ACROSS for t in kitchen.things if t.kind == kind)
 
     def errand(
         self, spec: TrialSpec, running: LockstepRunner, robot: MujocoRobot, kitchen: KitchenLayout, oracle: Oracle
@@ -117,18 +115,13 @@ class CounterRung(KitchenRung[CounterOptions]):
         return Errand(result, watch, lambda: counter_verdict(watch, place))
 
     def _errand(
-        self,
-        running: LockstepRunner,
-        robot: MujocoRobot,
-        watch: CounterWatch,
-        goal: TakeGoal,
-        place: tuple[float, float],
+        self, running: LockstepRunner, robot: MujocoRobot, watch: CounterWatch, goal: TakeGoal, at: tuple[float, float]
     ) -> SkillResult:
         taken = running.execute("take", goal, watch=watch)
         if not taken.success:
             return taken
         found = taken.value if isinstance(taken.value, TakeReport) else TakeReport()
-        spot = np.linalg.inv(robot.truth.T_world_odom) @ (*place, 0.0, 1.0)
+        spot = np.linalg.inv(robot.truth.T_world_odom) @ (*at, 0.0, 1.0)
         side: Side = "left" if found.side == "left" else "right"
         aside, off = (found.aside_x, found.aside_y), (found.off_x, found.off_y)
         x, y = float(spot[0]), float(spot[1])
@@ -138,9 +131,7 @@ class CounterRung(KitchenRung[CounterOptions]):
             "detect_to_grasp": taken.timings.get("detect_to_grasp", 0.0),
             "total": taken.timings.get("total", 0.0) + placed.timings.get("total", 0.0),
         }
-        return SkillResult(
-            placed.success, placed.stage, placed.slot, placed.reason, timings, placed.value, placed.trace
-        )
+        return replace(placed, timings=timings)
 
 
 class CounterTether(CounterRung):

@@ -77,7 +77,10 @@ class HallWalk:
             self.stood += (t - self._since) * (before.note not in WALKING)
         self._step, self._since = step, t
         if len(step.people):
-            off = step.people[:, None, :2] - _people(episode)
+            # Where everybody really is, in odom, which is also the frame of the survey's map [m].
+            T = np.linalg.inv(episode.robot.truth.T_world_odom)
+            places = [T[:2, :3] @ person.position(episode.t) + T[:2, 3] for person in episode.robot.scene.people]
+            off = step.people[:, None, :2] - np.array(places).reshape(-1, 2)
             self.walkers += len(step.people)
             self.nobody += int((np.hypot(off[..., 0], off[..., 1]) > SOMEBODY).all(axis=1).sum())
 
@@ -87,13 +90,6 @@ class HallWalk:
         if self.walkers:
             found["nobody"] = self.nobody / self.walkers
         return found
-
-
-def _people(episode: Episode) -> Array:
-    """Return (k, 2) where everybody really is in odom, which is also the frame of the survey's map [m]."""
-    T, t = np.linalg.inv(episode.robot.truth.T_world_odom), episode.t
-    places = [T[:2, :3] @ person.position(t) + T[:2, 3] for person in episode.robot.scene.people]
-    return np.array(places).reshape(-1, 2)
 
 
 MapKind = Literal["survey", "none"]

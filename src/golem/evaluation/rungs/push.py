@@ -51,7 +51,9 @@ class PushRung(LegRung[PlantOptions]):
             strip = FilmStrip(episode.robot, push.bearing)
             episode.stand(settle)
             if episode.loss is not None:
-                return never_pushed(episode.loss, spec.method)
+                loss, stage = episode.loss, FAULT if episode.loss.stage == FAULT else "settle"
+                detail = f"{loss.detail.removesuffix('.')}. It was not pushed yet."
+                return TrialOutcome(False, stage, f"lower_body: {spec.method}", detail, trace=loss.trace)
             start = episode.t
             episode.push(push)
             self.pursue(episode, strip)
@@ -76,13 +78,6 @@ class PushRung(LegRung[PlantOptions]):
         for seconds in MOMENTS:
             strip.keep(episode.t, episode.force)
             episode.run(seconds)
-
-
-def never_pushed(loss: Loss, method: str) -> TrialOutcome:
-    """Return the outcome of a robot that was lost before its push."""
-    stage = FAULT if loss.stage == FAULT else "settle"
-    detail = f"{loss.detail.removesuffix('.')}. It was not pushed yet."
-    return TrialOutcome(False, stage, f"lower_body: {method}", detail, trace=loss.trace)
 
 
 def measures(trace: BalanceTrace, start: float) -> dict[str, float]:

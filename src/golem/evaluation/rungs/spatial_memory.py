@@ -75,13 +75,10 @@ def timeline(memory: Memory, episode: Relocation) -> list[ObjectTimeline]:
             there = any(p.evidence in ("seen", "similar") for p in known)
             row.beliefs.append("there" if there else "gone" if known else "")
             now = memory.query(kind, "now", None, 1) if row.present[k] and row.seen else None
-            row.told.append(None if now is None else _right(now, row.thing))
+            row.told.append(
+                None if now is None else bool(now) and now[0].evidence != "moved" and hits(now[0], row.thing)
+            )
     return rows
-
-
-def _right(now: Sequence[Place], thing: Thing) -> bool:
-    """Return whether the first place of an answer, which is not told as moved, is that of the thing."""
-    return bool(now) and now[0].evidence != "moved" and hits(now[0], thing)
 
 
 ROW = 0.29

@@ -92,14 +92,9 @@ class Worker(AbstractContextManager["Worker", None]):
         self._name = name
         paths = [str(source.resolve()), *filter(None, [os.environ.get("PYTHONPATH")])]
         self._errors = TemporaryFile("w+")
-        self._process = subprocess.Popen(
-            [sys.executable, "-P", loop_measure.__file__, name],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=self._errors,
-            text=True,
-            env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
-        )
+        command, pipe = [sys.executable, "-P", loop_measure.__file__, name], subprocess.PIPE
+        env = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
+        self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=self._errors, text=True, env=env)
 
     def ask(self, *words: object) -> Any:
         """Return its answer to a request; see `loop_measure.main`. Raises GolemError: it ended instead."""

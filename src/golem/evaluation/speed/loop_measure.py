@@ -253,10 +253,7 @@ def plain_loop(seconds: float) -> dict[str, float]:
 
 
 def warp_loop(steps: int) -> dict[str, Any]:
-    """Return robot seconds per second of mjlab's physics, MuJoCo Warp, with one robot of ours, and on which device.
-
-    Raises ImportError: it is not installed.
-    """
+    """Return mjlab's robot seconds per second (MuJoCo Warp, one robot of ours), and its device. Raises ImportError."""
     from golem.evaluation.episodes.episode import legs_stack
     from golem.runtime.lockstep import build_robot
 

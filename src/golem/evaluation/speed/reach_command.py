@@ -99,12 +99,8 @@ def _print(found: dict[Side, ReachMap]) -> None:
     for side, reach in found.items():
         inside = declared(reach)
         n, served = int(inside.sum()), reach.served() & inside
-        table.add_row(
-            side,
-            f"{100 * int(served.sum()) / n:.1f} %",
-            f"{np.median(reach.margin[served]):.2f}",
-            f"{1e3 * np.median(reach.com_shift[served]):.0f}",
-        )
+        margin, shift = np.median(reach.margin[served]), 1e3 * np.median(reach.com_shift[served])
+        table.add_row(side, f"{100 * int(served.sum()) / n:.1f} %", f"{margin:.2f}", f"{shift:.0f}")
     Console().print(table)
     print(f"{n} points a hand; margin and shift are medians over those served.")
 

@@ -155,7 +155,10 @@ def run_study_command(config: StudyConfig) -> Study | None:
         golem.errors.GolemError: see `run_ladder`.
     """
     if config.tables:
-        write_tables(config.paths)
+        if len(config.paths) < 2:
+            raise ConfigError("golem study --tables needs a folder of studies and at least one Markdown file.")
+        for page in config.paths[1:]:
+            _write_tables(config.paths[0], page)
         return None
     if len(config.paths) != 1:
         raise ConfigError(
@@ -251,19 +254,6 @@ def _state(config: StudyConfig, study: StudyFile, cells: Sequence[Cell], out: Pa
         "compare": [list(pair) for pair in study.compare], "cells": {cell.name: cell.config.n for cell in cells},
     }  # fmt: skip
     write_file(out / FACTS, json.dumps(facts, indent=1) + "\n")
-
-
-def write_tables(paths: Sequence[Path]) -> None:
-    """Write the tables of the studies in the first of `paths` into the documents that follow.
-
-    Raises:
-        ConfigError: a document names no study, or one that is not there, or studies of different code.
-        OutputError: a document cannot be read or written.
-    """
-    if len(paths) < 2:
-        raise ConfigError("golem study --tables needs a folder of studies and at least one Markdown file.")
-    for page in paths[1:]:
-        _write_tables(paths[0], page)
 
 
 def _write_tables(folder: Path, page: Path) -> None:

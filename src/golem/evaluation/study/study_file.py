@@ -113,13 +113,8 @@ def _expand(study: StudyFile, entry: StudyEntry) -> list[Cell]:
             for name, value, all_ in zip(AXES, chosen, values, strict=True)
             if len(all_) > 1 and (name != "rung" or entry.name)
         ]
-        found.append(
-            Cell(
-                "-".join(parts),
-                _ladder(study, entry, rung, profile, layout, engine, seed),
-                entry.best_n or study.best_n,
-            )
-        )
+        config = _ladder(study, entry, rung, profile, layout, engine, seed)
+        found.append(Cell("-".join(parts), config, entry.best_n or study.best_n))
     return found
 
 

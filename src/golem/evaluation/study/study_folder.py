@@ -164,9 +164,7 @@ class Study:
         records = [r for cell in self.cells for r in cell.records]
         counts = [len({r.index for r in cell.of(m)}) for cell in self.cells for m in cell.methods]
         n = f"{min(counts)}" if min(counts) == max(counts) else f"{min(counts)} to {max(counts)}"
-        seeds, profiles = (
-            ", ".join(dict.fromkeys(str(getattr(r, name)) for r in records)) for name in ("seed", "profile")
-        )
+        seeds, profiles = (", ".join(dict.fromkeys(str(getattr(r, of)) for r in records)) for of in ("seed", "profile"))
         return f"Profile {profiles}, n = {n} per method and cell, seed {seeds}, commit `{self.commit}`."
 
     def markdown(self) -> str:
@@ -198,9 +196,7 @@ def read_study(folder: Path) -> Study:
         held = {name: path for name, path in cells.items() if (path / "trials.jsonl").is_file()}
         if not held:
             raise ConfigError(f"{folder} holds no trials yet; run its study first: {facts['command']}")
-        results = tuple(
-            CellResult(name, path, facts["cells"][name], tuple(finished_records(path))) for name, path in held.items()
-        )
+        results = tuple(CellResult(k, p, facts["cells"][k], tuple(finished_records(p))) for k, p in held.items())
         missing = tuple(name for name in cells if name not in held)
         words = {name: facts[name] for name in WORDS}
         study = Study(**words, rule=facts["rule"], compare=facts["compare"], cells=results, missing=missing)

@@ -78,11 +78,8 @@ def parse_qos(text: str) -> Qos:
         profile = cast("Any", read_yaml(text, "QoS") or [{}])[0]
         history, reliability, durability = (profile[k] for k in ("history", "reliability", "durability"))
         depth = int(profile.get("depth") or 0)
-        return Qos(
-            reliability in (RELIABLE, "reliable"),
-            durability in (TRANSIENT_LOCAL, "transient_local"),
-            None if history in (KEEP_ALL, "keep_all") else max(depth, 1),
-        )
+        kept = None if history in (KEEP_ALL, "keep_all") else max(depth, 1)
+        return Qos(reliability in (RELIABLE, "reliable"), durability in (TRANSIENT_LOCAL, "transient_local"), kept)
     except (ConfigError, LookupError, TypeError, ValueError, AttributeError):
         return DEFAULT
 
@@ -106,9 +103,7 @@ def information(files: Mapping[str, Contents], custom: Mapping[str, str]) -> dic
         "compression_format": "",  # of whole files or messages; MCAP compresses its chunks by itself
         "compression_mode": "",
         "relative_file_paths": list(files),
-        "files": [
-            {"path": name, **_span(contents), "message_count": contents.messages} for name, contents in files.items()
-        ],
+        "files": [{"path": name, **_span(c), "message_count": c.messages} for name, c in files.items()],
         "custom_data": dict(custom),
         "ros_distro": "",
     }

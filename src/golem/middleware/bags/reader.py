@@ -252,13 +252,9 @@ def _records(file: IO[bytes], end: int) -> Iterator[McapRecord]:
 
 
 def _topic(channel: Channel, schema: Schema) -> BagTopic:
-    return BagTopic(
-        channel.topic,
-        schema.name,
-        schema.data.decode(),
-        parse_qos(channel.metadata.get("offered_qos_profiles", "")),
-        channel.metadata.get("topic_type_hash", ""),
-    )
+    about, definition = channel.metadata, schema.data.decode()
+    qos = parse_qos(about.get("offered_qos_profiles", ""))
+    return BagTopic(channel.topic, schema.name, definition, qos, about.get("topic_type_hash", ""))
 
 
 def _message(topic: BagTopic, record: Record) -> BagMessage:

@@ -169,7 +169,11 @@ class McapFile:
         topic = message.topic
         channel = self._channels.get(topic)
         if channel is None:
-            channel = self._channels[topic] = self._register(topic)
+            key = (topic.kind, topic.definition)
+            if key not in self._schemas:
+                self._schemas[key] = self._mcap.register_schema(topic.kind, "ros2msg", topic.definition.encode())
+            about = {"offered_qos_profiles": offered_qos(topic.qos), "topic_type_hash": topic.type_hash}
+            channel = self._channels[topic] = self._mcap.register_channel(topic.name, "cdr", self._schemas[key], about)
         self._mcap.add_message(
             channel,
             message.log_time,
@@ -194,13 +198,6 @@ class McapFile:
         """Close without an index."""
         with suppress(OSError):
             self._out.close()
-
-    def _register(self, topic: BagTopic) -> int:
-        key = (topic.kind, topic.definition)
-        if key not in self._schemas:
-            self._schemas[key] = self._mcap.register_schema(topic.kind, "ros2msg", topic.definition.encode())
-        about = {"offered_qos_profiles": offered_qos(topic.qos), "topic_type_hash": topic.type_hash}
-        return self._mcap.register_channel(topic.name, "cdr", self._schemas[key], about)
 
 
 def write_metadata(folder: Path, files: Mapping[str, Contents], custom: Mapping[str, str]) -> None:

@@ -138,10 +138,7 @@ class Reader(Protocol):
     handle: int
 
     def take(self, maximum: int = 64) -> list[Sample]:
-        """Remove and return up to `maximum` samples, oldest first; none is an empty list.
-
-        Raises DdsError: the reader is closed.
-        """
+        """Remove and return up to `maximum` samples, oldest first, or none. Raises DdsError: the reader is closed."""
         ...
 
     def matched(self) -> int:

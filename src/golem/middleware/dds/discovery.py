@@ -57,9 +57,7 @@ def members(participant: CycloneParticipant) -> list[Member]:
 
     def read(data: ParticipantData) -> Member:
         library = participant.library
-        name, number, machine = (
-            read_property(library, data.qos, key) for key in ("__ProcessName", "__Pid", "__Hostname")
-        )
+        name, number, machine = (read_property(library, data.qos, k) for k in ("__ProcessName", "__Pid", "__Hostname"))
         process = f"{name} (process {number} on {machine})" if number else ""
         return Member(bytes(data.guid), read_user_data(library, data.qos), process)
 
@@ -87,14 +85,9 @@ def _endpoints(participant: CycloneParticipant, topic: int) -> list[Endpoint]:
 
 
 def _endpoint(library: Cyclone, data: EndpointData) -> Endpoint:
-    return Endpoint(
-        data.topic.decode(errors="replace"),
-        data.type_name.decode(errors="replace"),
-        read_qos(library, data.qos),
-        bytes(data.guid),
-        bytes(data.participant_guid),
-        read_user_data(library, data.qos),
-    )
+    topic, kind = (name.decode(errors="replace") for name in (data.topic, data.type_name))
+    qos, user_data = read_qos(library, data.qos), read_user_data(library, data.qos)
+    return Endpoint(topic, kind, qos, bytes(data.guid), bytes(data.participant_guid), user_data)
 
 
 def _take(participant: CycloneParticipant, topic: int, kind: Any, read: Callable[[Any], Any]) -> list[Any]:

@@ -137,7 +137,10 @@ class ActionServer:
             del self._results[goal.id]
             self._news = True
         if self._news and (len(self._table) <= FEW or time.monotonic() >= self._next_status):
-            self._publish_status()
+            self._news = False
+            goals = [StatusMessage(states.goal_info(g.id, g.stamp), int(g.status)) for g in self._table.reported()]
+            self._status.write(codec.serialize(GoalStatusArray(goals)))
+            self._next_status = time.monotonic() + SPACING * len(goals)
 
     def close(self) -> None:
         """Stop; goals that have not ended never will. Calling it again does nothing."""
@@ -193,7 +196,10 @@ class ActionServer:
                 self._handler.accepted(goal)
             except Exception as error:  # a user's handler may raise anything
                 self._endpoints.guard.caught(f"Action '{self.name}'", error)
-                self._give_up(goal)
+                if goal.status is states.GoalStatus.ACCEPTED:
+                    goal.execute()
+                if goal.status.active:
+                    goal.abort(self._type.Result())
 
     def _agrees(self, decide: Callable[[Any], bool], about: Any) -> bool:
         """Return what the handler decides; one that raises does not agree."""
@@ -202,13 +208,6 @@ class ActionServer:
         except Exception as error:  # a user's handler may raise anything
             self._endpoints.guard.caught(f"Action '{self.name}'", error)
             return False
-
-    def _give_up(self, goal: ServerGoal) -> None:
-        """Abort a goal that its handler failed to take charge of."""
-        if goal.status is states.GoalStatus.ACCEPTED:
-            goal.execute()
-        if goal.status.active:
-            goal.abort(self._type.Result())
 
     def _on_cancel(self, origin: Origin, request: CancelGoal_Request) -> None:
         info = request.goal_info
@@ -234,9 +233,3 @@ class ActionServer:
         else:
             response = self._type.GetResult.Response(int(states.GoalStatus.UNKNOWN), self._type.Result())
             self._result.reply(origin, codec.serialize(response))
-
-    def _publish_status(self) -> None:
-        self._news = False
-        goals = [StatusMessage(states.goal_info(g.id, g.stamp), int(g.status)) for g in self._table.reported()]
-        self._status.write(codec.serialize(GoalStatusArray(goals)))
-        self._next_status = time.monotonic() + SPACING * len(goals)

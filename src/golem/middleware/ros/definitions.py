@@ -96,23 +96,11 @@ def load(distro: str) -> Typestore:
 def service(name: str) -> dict[str, Definition]:
     """Return what rosidl derives from a service: its event, and the service as the type that its hash is of."""
     request, response, event = (f"{name}_{part}" for part in ("Request", "Response", "Event"))
+    info, parts = (NAME, "service_msgs/msg/ServiceEventInfo"), {"request": request, "response": response}
+    said = [("info", info), *((part, (SEQUENCE, ((NAME, kind), 1))) for part, kind in parts.items())]
     return {
-        event: (
-            [],
-            [
-                ("info", (NAME, "service_msgs/msg/ServiceEventInfo")),
-                ("request", (SEQUENCE, ((NAME, request), 1))),
-                ("response", (SEQUENCE, ((NAME, response), 1))),
-            ],
-        ),
-        name: (
-            [],
-            [
-                ("request_message", (NAME, request)),
-                ("response_message", (NAME, response)),
-                ("event_message", (NAME, event)),
-            ],
-        ),
+        event: ([], said),
+        name: ([], [(f"{part}_message", (NAME, kind)) for part, kind in {**parts, "event": event}.items()]),
     }
 
 
@@ -152,10 +140,7 @@ def nested(fields: list[Field]) -> list[str]:
 
 
 def text(name: str, types: dict[str, Definition]) -> str:
-    """Return the definition of type `name` in the language of .msg files, followed by those it uses.
-
-    This is what bags carry (MCAP's schema encoding `ros2msg`).
-    """
+    """Return the definition of type `name` as .msg files have it, with those it uses: MCAP's encoding `ros2msg`."""
     order = [name]
     for each in order:
         order += [used for used in nested(types[each][1]) if used not in order]
@@ -166,7 +151,8 @@ def text(name: str, types: dict[str, Definition]) -> str:
 
 def _lines(definition: Definition) -> list[str]:
     constants, fields = definition
-    written = [f"{kind} {name}={_literal(value)}" for name, kind, value in constants]
+    literals = [(f'"{value}"' if isinstance(value, str) else value) for *_, value in constants]
+    written = [f"{kind} {name}={said}" for (name, kind, _), said in zip(constants, literals, strict=True)]
     return written + [f"{_spelled(kind)} {name}" for name, kind in fields if name != EMPTY_MEMBER]
 
 
@@ -190,10 +176,6 @@ def _short(name: str) -> str:
     """
     package, _, stem = name.split("/")
     return f"{package}/{stem.replace('_', '')}"
-
-
-def _literal(value: object) -> str:
-    return f'"{value}"' if isinstance(value, str) else str(value)
 
 
 def _without_char(kind: Kind) -> Kind:

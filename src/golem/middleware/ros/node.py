@@ -95,10 +95,7 @@ class RosNode:
             self.service(f"~/{service}", f"rcl_interfaces/srv/{kind}", answer)
 
     def publisher(self, topic: str, type: str, qos: Qos = DEFAULT) -> Publisher:
-        """Publish messages of `type` on `topic`.
-
-        Raises ConfigError: the name is invalid, or the type unknown; so for everything below.
-        """
+        """Publish messages of `type` on `topic`. Raises ConfigError, as all below: an invalid name or unknown type."""
         return Publisher(self._endpoints, self._resolve(topic), type, qos)
 
     def subscription(
@@ -140,10 +137,7 @@ class RosNode:
             self._endpoints.waitset.wait(min(left, LOOK))
 
     def wait(self, future: Future[T], timeout: float) -> T:
-        """Spin until `future` is done and return its value; after `timeout` [s] it is given up.
-
-        Raises RosError: it failed, or did not arrive in time.
-        """
+        """Spin until `future` is done and return its value. Raises RosError: it failed, or took over `timeout` [s]."""
         end = time.monotonic() + timeout
         while not future.done:
             left = end - time.monotonic()

@@ -99,15 +99,12 @@ class Client:
         """Stop; what is unanswered fails. Calling it again does nothing."""
         self._endpoints.dismiss(self)
         self._endpoints.close(self._writer, self._inbox)
-        self._give_up(f"The client of '{self.name}' was closed.")
+        for future in list(self._pending.values()):
+            future.cancel(f"The client of '{self.name}' was closed.")
 
     def _forget(self, number: int) -> None:
         self._pending.pop(number, None)
         self._servers.pop(number, None)
-
-    def _give_up(self, reason: str) -> None:
-        for future in list(self._pending.values()):
-            future.cancel(reason)
 
     def _take(self, sample: Sample) -> None:
         try:
@@ -137,7 +134,9 @@ class Responder:
         reply, request = names.reply(name), names.request(name)
         self._writer = endpoints.writer(reply, f"{type}_Response", SERVICES, owner)
         self._inbox = endpoints.inbox(request, f"{type}_Request", SERVICES, self._take, owner)
-        self._linked = endpoints.linked(reply, request, type, SERVICES, self._take_linked, owner)
+        self._linked = endpoints.linked(
+            reply, request, type, SERVICES, lambda sample: self._receive(sample, True), owner
+        )
         endpoints.attend(self)
 
     def reply(self, origin: Origin, response: Payload) -> None:
@@ -196,9 +195,6 @@ class Responder:
         elif self._linked is None and not self._warned:
             self._warned = True
             self._endpoints.guard.log(_deaf(self.name))
-
-    def _take_linked(self, sample: Sample) -> None:
-        self._receive(sample, True)
 
     def _receive(self, sample: Sample, linked: bool) -> None:
         try:

@@ -26,14 +26,8 @@ class WireError(GolemError):
 
 def structure(size: int, fields: Fields) -> np.dtype[np.void]:
     """Return the dtype of a structure of `size` bytes; fields may overlap, bytes without a field are padding."""
-    return np.dtype(
-        {
-            "names": list(fields),
-            "formats": [kind for _, kind in fields.values()],
-            "offsets": [offset for offset, _ in fields.values()],
-            "itemsize": size,
-        }
-    )
+    formats, offsets = [kind for _, kind in fields.values()], [offset for offset, _ in fields.values()]
+    return np.dtype({"names": list(fields), "formats": formats, "offsets": offsets, "itemsize": size})
 
 
 def check_encapsulation(payload: Payload, type_name: str) -> None:

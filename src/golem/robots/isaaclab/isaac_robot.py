@@ -85,13 +85,8 @@ class WorkerProcess:
         sizes = len(scene["joints"]), len(scene["bodies"])
         self._request, self._reply_type = np.zeros((), request_type(*sizes)), reply_type(*sizes)
         with self._log.open("wb") as log:
-            self._process = subprocess.Popen(
-                [python, "-I", isaac_worker.__file__, folder / "scene.json"],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=log,
-                cwd=folder,
-            )
+            words, pipe = [python, "-I", isaac_worker.__file__, folder / "scene.json"], subprocess.PIPE
+            self._process = subprocess.Popen(words, stdin=pipe, stdout=pipe, stderr=log, cwd=folder)
         try:
             self.versions = self._hear_of_the_world(python)
         except BaseException:

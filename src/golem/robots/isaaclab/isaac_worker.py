@@ -96,7 +96,12 @@ class Simulation:
         """
         self._torch = importlib.import_module("torch")
         self._torch.set_num_threads(1)
-        _let_cpus_pin()
+        # OvPhysX asks for pinned memory even on the CPU: it is ordinary memory then.
+        warp = importlib.import_module("warp")
+        warp.init()
+        if not warp.is_cuda_available():
+            cpu = warp.get_device("cpu")
+            cpu.pinned_allocator = cpu.default_allocator
         sim_utils = importlib.import_module("isaaclab.sim")
         scenes = importlib.import_module("isaaclab.scene")
         assets = importlib.import_module("isaaclab.assets")
@@ -169,15 +174,6 @@ class Simulation:
 
     def _row(self, values: NDArray[np.float64]) -> Any:
         return self._torch.from_numpy(values.astype(np.float32)[None])
-
-
-def _let_cpus_pin() -> None:
-    """Let pinned memory be ordinary memory where there is no CUDA: OvPhysX asks for it even on the CPU."""
-    warp = importlib.import_module("warp")
-    warp.init()
-    if not warp.is_cuda_available():
-        cpu = warp.get_device("cpu")
-        cpu.pinned_allocator = cpu.default_allocator
 
 
 def _physics(backend: str) -> Any:

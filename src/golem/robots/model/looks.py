@@ -174,9 +174,7 @@ def _finger() -> Iterable[VisualPart]:
     inner = -0.0208
     outer = [(0.0, 0.003), (0.02, 0.004), (0.045, 0.0), (0.065, -0.0075), (0.0813, -0.0175)]
     yield VisualPart(
-        blade,
-        "graphite",
-        Loft("z", [(z, 0.003, (inner + y) / 2.0, 0.008, (y - inner) / 2.0) for z, y in outer], power=5.0),
+        blade, "graphite", Loft("z", [(z, 0.003, (inner + y) / 2, 0.008, (y - inner) / 2) for z, y in outer], power=5.0)
     )
     x, y, z = magpie_model.PAD_CENTER.tolist()
     yield VisualPart(blade, "rubber", Solid("box", tuple(magpie_model.PAD_HALF_SIZE.tolist()), (x, y, z)))

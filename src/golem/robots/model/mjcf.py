@@ -88,28 +88,16 @@ def _add_body(
 ) -> mujoco.MjsBody:
     quat = [1.0, 0.0, 0.0, 0.0] if rotation is None else quat_of(rotation)
     xx, xy, xz, yy, yz, zz = inertial.six()
-    return parent.add_body(
-        name=name,
-        pos=pos,
-        quat=quat,
-        mass=inertial.mass,
-        ipos=inertial.com,
-        fullinertia=[xx, yy, zz, xy, xz, yz],
-        explicitinertial=True,
-    )
+    body = parent.add_body(name=name, pos=pos, quat=quat, mass=inertial.mass, ipos=inertial.com)
+    body.fullinertia, body.explicitinertial = [xx, yy, zz, xy, xz, yz], True
+    return body
 
 
 def _add_motor(spec: mujoco.MjSpec, joint: str, limit: float) -> None:
-    hinge = spec.joint(joint)
-    hinge.actfrclimited = mujoco.mjtLimited.mjLIMITED_TRUE  # Pinocchio and Newton read limits of torque here
-    hinge.actfrcrange = [-limit, limit]
-    motor = spec.add_actuator(
-        name=joint,
-        target=joint,
-        trntype=mujoco.mjtTrn.mjTRN_JOINT,
-        ctrllimited=mujoco.mjtLimited.mjLIMITED_TRUE,
-        ctrlrange=[-limit, limit],
-    )
+    hinge, limited, bounds = spec.joint(joint), mujoco.mjtLimited.mjLIMITED_TRUE, [-limit, limit]
+    hinge.actfrclimited, hinge.actfrcrange = limited, bounds  # Pinocchio and Newton read limits of torque here
+    motor = spec.add_actuator(name=joint, target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+    motor.ctrllimited, motor.ctrlrange = limited, bounds
     motor.set_to_motor()
 
 

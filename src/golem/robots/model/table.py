@@ -126,9 +126,7 @@ JOINT_NAMES: tuple[str, ...] = tuple(joint.name for joint in JOINTS)
 """Their names, in the same order."""
 JOINT_INDEX: dict[str, int] = {name: i for i, name in enumerate(JOINT_NAMES)}
 """Motor index by joint name."""
-LINKS: dict[str, Inertial] = {
-    row["name"]: Inertial.of(row["mass"], row["com"], row["inertia"]) for row in _DATA["links"]
-}
+LINKS: dict[str, Inertial] = {r["name"]: Inertial.of(r["mass"], r["com"], r["inertia"]) for r in _DATA["links"]}
 """Mass properties of the 28 links, each in its link frame, parents before children."""
 FRAMES: dict[str, SensorFrame] = {
     row["name"]: SensorFrame(row["name"], row["parent"], transform(row["xyz"], rotation_rpy(*row["rpy"])))

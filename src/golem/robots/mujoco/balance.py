@@ -156,9 +156,7 @@ class BalanceTrace:
     def save(self, path: Path) -> None:
         """Write the trace as a compressed npz with one float32 array per attribute; the folder is made."""
         path.parent.mkdir(parents=True, exist_ok=True)
-        arrays = {
-            f.name: a if (a := getattr(self, f.name)).dtype == bool else a.astype(np.float32) for f in fields(self)
-        }
+        arrays = {f.name: a if (a := getattr(self, f.name)).dtype == bool else a.astype("f4") for f in fields(self)}
         part = path.with_suffix(".part")
         with part.open("wb") as file:
             np.savez_compressed(file, allow_pickle=False, **arrays)
@@ -168,9 +166,7 @@ class BalanceTrace:
     def load(cls, path: Path) -> BalanceTrace:
         """Return the trace that `save` wrote."""
         with np.load(path) as stored:
-            return cls(
-                *(stored[f.name] if f.name == "contact" else stored[f.name].astype(np.float64) for f in fields(cls))
-            )
+            return cls(*(stored[f.name] if f.name == "contact" else stored[f.name].astype(float) for f in fields(cls)))
 
 
 class HasTruth(Protocol):

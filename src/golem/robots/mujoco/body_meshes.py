@@ -99,12 +99,8 @@ def _surface(surface: Look, pieces: list[trimesh.Trimesh]) -> trimesh.Trimesh:
     joined = trimesh.util.concatenate([trimesh.graph.smooth_shade(piece, angle=SMOOTH) for piece in pieces])
     assert isinstance(joined, trimesh.Trimesh)
     normals: NDArray[np.float64] = joined.vertex_normals
-    material = PBRMaterial(
-        baseColorFactor=[*linear(rgba[:3]), rgba[3]],
-        metallicFactor=0.0,
-        roughnessFactor=roughness,
-        alphaMode="OPAQUE" if rgba[3] >= 1.0 else "BLEND",
-    )
+    colour, mode = [*linear(rgba[:3]), rgba[3]], "OPAQUE" if rgba[3] >= 1.0 else "BLEND"
+    material = PBRMaterial(baseColorFactor=colour, metallicFactor=0.0, roughnessFactor=roughness, alphaMode=mode)
     return trimesh.Trimesh(
         joined.vertices, joined.faces, vertex_normals=normals, visual=TextureVisuals(material=material), process=False
     )

@@ -78,9 +78,7 @@ class MujocoRobot:
         self.calibration: dict[str, Array] = {
             name: np.asarray(np.linalg.inv(T), dtype=np.float64) for name, T in self._errors.T_nominal_actual.items()
         }
-        self._depth = {
-            name: StereoDepth(info, self.profile.depth, stream(seed, f"depth/{name}")) for name, info in CAMERAS.items()
-        }
+        self._depth = {n: StereoDepth(i, self.profile.depth, stream(seed, f"depth/{n}")) for n, i in CAMERAS.items()}
         self._exposure = {
             name: AutoExposure(conditions.light, stream(seed, f"exposure/{name}"), self.profile.colour_noise)
             for name in CAMERAS
@@ -249,13 +247,9 @@ class MujocoRobot:
     def imu(self) -> Imu:
         # MuJoCo's sensors describe the beginning of the last step. Orientation and rate must be of the encoders'
         # instant: 2 ms apart they make planted feet seem to move by a centimetre per second.
-        base, torso = self._base, self._torso
-        quat, gyro = torso_motion(
-            self.data.qpos[base.qposadr[0] + 3 : base.qposadr[0] + 7],
-            self.data.qvel[base.dofadr[0] + 3 : base.dofadr[0] + 6],
-            float(self.data.qpos[torso.qposadr[0]]),
-            float(self.data.qvel[torso.dofadr[0]]),
-        )
+        data, torso, q, v = self.data, self._torso, self._base.qposadr[0], self._base.dofadr[0]
+        turn, rate = float(data.qpos[torso.qposadr[0]]), float(data.qvel[torso.dofadr[0]])
+        quat, gyro = torso_motion(data.qpos[q + 3 : q + 7], data.qvel[v + 3 : v + 6], turn, rate)
         return self._imu_model.measure(quat, gyro, self.data.sensordata[self._acc])
 
     def hand(self, side: Side, t: float) -> HandState:
@@ -264,9 +258,7 @@ class MujocoRobot:
     def capture(self, camera: str) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
         if self._rig is None:
             lenses = self._errors.intrinsics
-            self._rig = CameraRig(
-                self._model, [info.with_lens(*lenses[name].tolist()) for name, info in self.cameras.items()]
-            )
+            self._rig = CameraRig(self._model, [c.with_lens(*lenses[k].tolist()) for k, c in self.cameras.items()])
         # A physics step ends with the joints one step ahead of the frames; the exposure shall show where they are.
         mujoco.mj_kinematics(self._model, self.data)
         mujoco.mj_camlight(self._model, self.data)

@@ -153,7 +153,10 @@ def _build(spec: mujoco.MjSpec, config: MujocoConfig, layout: PackLayout, profil
         layout = layout.seen_with(stance)
         tight = stream(seed, "world/tight") if varied else None
         names = add_pack(spec, layout, draws, stance=stance, workshop=config.world in WORKSHOPS, tight=tight)
-        _displace_hands(spec, conditions.hand_offset, stream(seed, "world/hands"))
+        off = stream(seed, "world/hands")
+        for side in SIDES:
+            hand, way = spec.body(magpie_model.hand_name(side)), off.standard_normal(3)
+            hand.pos = hand.pos + conditions.hand_offset * way / np.linalg.norm(way)
         add_clutter(spec, layout, round(conditions.clutter), stream(seed, "world/clutter"))
         dress(spec, conditions, stance)
         if config.gantry:
@@ -169,7 +172,9 @@ def _build(spec: mujoco.MjSpec, config: MujocoConfig, layout: PackLayout, profil
         _aim(spec.worldbody.add_camera(name=ONLOOKER.name), at + (-1.2, 0.9, 1.9), at + (0.4, 0.0, 0.9))
     else:
         people = _add_terrain(spec, config, seed)
-        _add_companion(spec)
+        camera = spec.body(BASE_LINK).add_camera(name=ONLOOKER.name)
+        camera.mode = mujoco.mjtCamLight.mjCAMLIGHT_TRACK
+        _aim(camera, np.array([2.6, 2.0, 0.5]), np.zeros(3))
     if config.cone is not None:
         spec.option.cone = mujoco.mjtCone.__members__[f"mjCONE_{config.cone.upper()}"]
     if config.support == "ground":
@@ -284,13 +289,6 @@ def _add_payload(hand: mujoco.MjsBody, mass: float) -> None:
     )
 
 
-def _displace_hands(spec: mujoco.MjSpec, by: float, rng: np.random.Generator) -> None:
-    """Mount each hand `by` [m] beside its place, in a direction of its own."""
-    for side in SIDES:
-        hand, way = spec.body(magpie_model.hand_name(side)), rng.standard_normal(3)
-        hand.pos = hand.pos + by * way / np.linalg.norm(way)
-
-
 def _add_gantry(spec: mujoco.MjSpec, layout: PackLayout) -> None:
     """Add a gantry's tool, a spindle under its column, parked above the middle of the pack."""
     x, y, z = (layout.pose() @ (0.5 * layout.size_x, 0.0, 1.0, 1.0))[:3]
@@ -342,13 +340,6 @@ def _add_kitchen_onlooker(spec: mujoco.MjSpec, kitchen: KitchenLayout, stance: P
             np.array([0.34, -0.02, kitchen.counter_top + 0.12]),
         )
     _aim(spec.worldbody.add_camera(name=ONLOOKER.name), eye + at, target + at)
-
-
-def _add_companion(spec: mujoco.MjSpec) -> None:
-    """Add a camera that goes along with the robot without turning, ahead of it to the left."""
-    camera = spec.body(BASE_LINK).add_camera(name=ONLOOKER.name)
-    camera.mode = mujoco.mjtCamLight.mjCAMLIGHT_TRACK
-    _aim(camera, np.array([2.6, 2.0, 0.5]), np.zeros(3))
 
 
 def _aim(camera: mujoco.MjsCamera, eye: Array, target: Array) -> None:

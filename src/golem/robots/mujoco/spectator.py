@@ -188,12 +188,5 @@ def headlight(model: mujoco.MjModel) -> Iterator[None]:
 
 def halved(info: CameraInfo) -> CameraInfo:
     """Return the same camera with half as many pixels along each side."""
-    return replace(
-        info,
-        width=info.width // 2,
-        height=info.height // 2,
-        fx=info.fx / 2,
-        fy=info.fy / 2,
-        cx=(info.cx - 0.5) / 2,
-        cy=(info.cy - 0.5) / 2,
-    )
+    fx, fy, cx, cy = info.fx / 2, info.fy / 2, (info.cx - 0.5) / 2, (info.cy - 0.5) / 2
+    return replace(info, width=info.width // 2, height=info.height // 2, fx=fx, fy=fy, cx=cx, cy=cy)

@@ -205,9 +205,7 @@ class PhysxTruth(Truth):
         super().__init__(model, data)
         self._bodies = bodies
         feet = [model.body(f"{side}_ankle_roll_link").name for side in SIDES]
-        self._part_of = {
-            link.name: feet.index(link.name) if link.name in feet else len(SIDES) for link in bodies.links.values()
-        }
+        self._part_of = {x.name: feet.index(x.name) if x.name in feet else len(SIDES) for x in bodies.links.values()}
 
     def _touching(self) -> list[tuple[str, Array]]:
         """Return the links that touch what is not the robot, and the impulse on each in the last step [N s]."""
@@ -265,21 +263,16 @@ class PhysxRobot(other_engine.OtherEngineRobot):
         self._root = self._bodies.articulation.get_root()
         active = self._bodies.articulation.get_active_joints()
         names = [joint.name for joint in active]
-        self._followers = [
-            (active[names.index(finger)], names.index(crank)) for finger, crank in other_engine.follower_names().items()
-        ]
+        self._followers = [(active[names.index(f)], names.index(c)) for f, c in other_engine.follower_names().items()]
         for joint, _ in self._followers:
             joint.set_drive_properties(*other_engine.FINGER_DRIVE)
         self._torso_link = self._bodies.links[model.body("torso_link").id]
-        self._place()
-        self.truth = PhysxTruth(model, self.data, self._bodies)
-
-    def _place(self) -> None:
         data, articulation = self.data, self._bodies.articulation
         base = self._base.qposadr[0]
         articulation.set_root_pose(self._pose(data.qpos[base : base + 3], data.qpos[base + 3 : base + 7]))
         articulation.set_qpos(data.qpos[self._joint_map.q].astype(np.float32))
         articulation.set_qvel(np.zeros(len(self._joint_map.q), np.float32))
+        self.truth = PhysxTruth(model, self.data, self._bodies)
 
     def _pose(self, pos: Array, quat: Array) -> object:
         return type(self._root.entity_pose)(pos.astype(np.float32), quat.astype(np.float32))

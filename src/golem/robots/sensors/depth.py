@@ -98,7 +98,9 @@ class StereoDepth:
         if e.grazing < np.pi / 2:
             valid &= self._faces_camera(inverse)
         if specular is not None and e.specular_loss > 0:
-            valid &= ~(specular & self._lost_patches())
+            # The logistic approximation of the normal quantile, within 0.02 in probability.
+            p = np.clip(self._errors.specular_loss, 1e-6, 1 - 1e-6)
+            valid &= ~(specular & (self._patches() < np.float32(np.log(p / (1 - p)) / 1.702)))
         if e.subpixel == 0 and e.disparity_step == 0:
             return np.where(valid, depth, np.float32(0))
         disparity = self._noise()
@@ -137,12 +139,6 @@ class StereoDepth:
         nodes = (-(-width // patch) + 1, -(-height // patch) + 1)
         grid = self._rng.standard_normal(nodes, dtype=np.float32)
         return _stretch(np.ascontiguousarray(_stretch(grid, patch)[:width].T), patch)[:height]
-
-    def _lost_patches(self) -> NDArray[np.bool_]:
-        """Return (height, width) True on blotches that cover the share `specular_loss`."""
-        # The logistic approximation of the normal quantile, within 0.02 in probability.
-        p = np.clip(self._errors.specular_loss, 1e-6, 1 - 1e-6)
-        return self._patches() < np.float32(np.log(p / (1 - p)) / 1.702)
 
     def _seen_by_both(self, inverse: Image) -> NDArray[np.bool_]:
         """Return (height, width) True where no nearer point to the right hides the point from the right imager."""

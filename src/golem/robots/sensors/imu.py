@@ -48,24 +48,15 @@ class ImuErrors:
     def draw_bias(self, rng: np.random.Generator) -> ImuBias:
         """Draw the constant errors of one episode."""
         tilt = self.tilt * np.append(rng.standard_normal(2), 0.0)
-        return ImuBias(
-            tilt=_small_rotation(tilt),
-            gyro=self.gyro_bias * rng.standard_normal(3),
-            acc=self.acc_bias * rng.standard_normal(3),
-        )
+        gyro, acc = self.gyro_bias * rng.standard_normal(3), self.acc_bias * rng.standard_normal(3)
+        return ImuBias(tilt=_small_rotation(tilt), gyro=gyro, acc=acc)
 
 
 BLOCK = 256
 """Samples whose noise is drawn at once; drawn one by one it would be the same."""
 
 IMU = np.dtype(
-    [
-        ("tilt", "f8", (4,)),
-        ("bias", "f8", (2, 3)),
-        ("noise", "f8", (3,)),
-        ("used", "i8"),
-        ("drawn", "f8", (BLOCK, 3, 3)),
-    ]
+    [("tilt", "f8", 4), ("bias", "f8", (2, 3)), ("noise", "f8", 3), ("used", "i8"), ("drawn", "f8", (BLOCK, 3, 3))]
 )
 """Errors of an IMU: tilt; bias of gyro and accelerometer; magnitudes of the noise of orientation, gyro and
 accelerometer; standard normal numbers for them, and how many samples have used theirs."""

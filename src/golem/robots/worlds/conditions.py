@@ -93,9 +93,7 @@ class Conditions:
     hand_offset: float = 0.0
 
 
-RANGES: dict[str, tuple[float, float]] = {
-    name: tuple(row["range"]) for name, row in _DATA["conditions"].items() if "range" in row
-}
+RANGES: dict[str, tuple[float, float]] = {k: tuple(r["range"]) for k, r in _DATA["conditions"].items() if "range" in r}
 """Ranges of a varied work place; uniform, the light's in its logarithm. What has none is not drawn."""
 HEIGHTS = dict.fromkeys(("ioniq5", "ioniq5_plant"), (-0.107, 0.203))
 """Range of `height` at a real pack: its rim is 0.75 to 1.06 m over the floor."""

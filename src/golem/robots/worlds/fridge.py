@@ -86,11 +86,8 @@ def add_fridge(spec: mujoco.MjSpec, layout: FridgeLayout) -> None:
     """Add the cabinet and its door; see `seal_of` for the gasket."""
     side = 1.0 if layout.hinge_left else -1.0  # y of the hinge as seen from the bar
     turn = layout.yaw
-    body = spec.worldbody.add_body(
-        name="fridge",
-        pos=[layout.front, layout.handle_y, 0.0],
-        quat=[float(np.cos(turn / 2)), 0.0, 0.0, float(np.sin(turn / 2))],
-    )
+    quat = [float(np.cos(turn / 2)), 0.0, 0.0, float(np.sin(turn / 2))]
+    body = spec.worldbody.add_body(name="fridge", pos=[layout.front, layout.handle_y, 0.0], quat=quat)
     middle = side * (layout.width / 2 - INSET)
     deep, tall, plinth = 0.56, 1.86, 0.08
     door_low, door_high = 0.62, tall - 0.02

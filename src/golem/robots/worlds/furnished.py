@@ -221,9 +221,7 @@ def _ground(spec: mujoco.MjSpec, half: float, *, lit: bool = True) -> None:
         friction=[hall.FLOOR_FRICTION, 0.01, 0.001],
     )  # fmt: skip
     for x, y in ((0.0, 2.0), (6.0, -2.0)) if lit else ():
-        world.add_light(
-            pos=[x, y, HEIGHT], dir=[0.0, 0.0, -1.0], diffuse=[0.5] * 3, ambient=[0.15] * 3, castshadow=False
-        )
+        world.add_light(pos=[x, y, HEIGHT], dir=[0, 0, -1], diffuse=[0.5] * 3, ambient=[0.15] * 3, castshadow=False)
 
 
 def _walls(body: mujoco.MjsBody, bounds: tuple[float, float, float, float]) -> None:

@@ -53,9 +53,7 @@ def ioniq5_data() -> Ioniq5Data:
     text = files(__package__ or "").joinpath("ioniq5.csv").read_text(encoding="utf-8")
     rows = [(row[0], [float(x) for x in row[1:]]) for row in csv.reader(text.splitlines()) if row[0][0] != "#"]
     kinds: tuple[Kind, ...] = tuple(known for kind, _ in rows for known in KINDS if kind == known)
-    fasteners, holes, cover = (
-        np.array([row for kind, row in rows if kind in wanted]) for wanted in (KINDS, ("hole",), ("cover",))
-    )
+    fasteners, holes, cover = (np.array([row for k, row in rows if k in w]) for w in (KINDS, ("hole",), ("cover",)))
     return Ioniq5Data(kinds, fasteners, holes, cover)
 
 

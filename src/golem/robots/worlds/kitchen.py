@@ -190,7 +190,11 @@ def add_kitchen(
     _add_counter(room, layout, sign)
     fridge = replace(layout.fridge, front=layout.fridge.front + at[0], handle_y=layout.fridge.handle_y + at[1])
     add_fridge(spec, fridge)
-    return (_handle(fridge), *stand(spec, layout.things, at))
+    reach = fridge.standoff
+    c, s = float(np.cos(fridge.yaw)), float(np.sin(fridge.yaw))
+    place = np.array([fridge.front - c * reach, fridge.handle_y - s * reach, fridge.handle_z])
+    size = np.array([2 * fridge.radius, 2 * fridge.radius, fridge.length])
+    return (PackPart("handle", "fridge_door", (HANDLE,), place, size), *stand(spec, layout.things, at))
 
 
 def set_contacts(spec: mujoco.MjSpec) -> None:
@@ -213,14 +217,6 @@ def stand(spec: mujoco.MjSpec, things: Sequence[StandingThing], at: tuple[float,
         top = np.array(place) + (0.0, 0.0, height)
         found.append(PackPart(thing.kind, thing.body, geoms, top, np.array([2 * radius, 2 * radius, height])))
     return found
-
-
-def _handle(fridge: FridgeLayout) -> PackPart:
-    reach = fridge.standoff
-    c, s = float(np.cos(fridge.yaw)), float(np.sin(fridge.yaw))
-    place = np.array([fridge.front - c * reach, fridge.handle_y - s * reach, fridge.handle_z])
-    size = np.array([2 * fridge.radius, 2 * fridge.radius, fridge.length])
-    return PackPart("handle", "fridge_door", (HANDLE,), place, size)
 
 
 def _add_materials(spec: mujoco.MjSpec, layout: KitchenLayout) -> None:

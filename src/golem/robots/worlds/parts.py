@@ -82,12 +82,8 @@ def collider(
 def add_mesh(spec: mujoco.MjSpec, name: str, vertices: Array, faces: Faces) -> str:
     """Add a visual mesh from (n, 3) vertices [m] and (m, 3) triangles; flat shaded. Returns `name`."""
     flat = vertices[faces.ravel()]  # unshared vertices, so that edges stay sharp
-    spec.add_mesh(
-        name=name,
-        uservert=flat.ravel().tolist(),
-        userface=list(range(len(flat))),
-        inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
-    )
+    shell, corners = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL, list(range(len(flat)))
+    spec.add_mesh(name=name, uservert=flat.ravel().tolist(), userface=corners, inertia=shell)
     return name
 
 
@@ -134,15 +130,8 @@ def holed_plate(half: float, hole_radius: float, depth: float, sides: int = 24) 
     outer = direction * (half / np.abs(direction).max(axis=1, keepdims=True))
     z0, z1 = np.zeros(sides), np.full(sides, -depth)
     corners = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * half
-    vertices = np.concatenate(
-        [
-            np.column_stack([outer, z0]),
-            np.column_stack([inner, z0]),
-            np.column_stack([inner, z1]),
-            np.column_stack([corners, np.zeros(4)]),
-            [[0.0, 0.0, -depth]],
-        ]
-    )
+    rings = [(outer, z0), (inner, z0), (inner, z1), (corners, np.zeros(4))]
+    vertices = np.concatenate([*(np.column_stack(ring) for ring in rings), [[0.0, 0.0, -depth]]])
     faces: list[tuple[int, int, int]] = []
     for i in range(sides):
         j = (i + 1) % sides

@@ -124,10 +124,7 @@ class ScrewDraw:
 
 
 def draw_screws(
-    rng: np.random.Generator,
-    ranges: ScrewRanges,
-    slots: Sequence[int],
-    kind: Callable[[int], Kind] = lambda slot: "screw",
+    rng: np.random.Generator, ranges: ScrewRanges, slots: Sequence[int], kind: Callable[[int], Kind] = lambda _: "screw"
 ) -> list[ScrewDraw]:
     """Draw one loosened fastener of its `kind` for each of `slots`; the same generator state gives the same."""
 
@@ -177,14 +174,9 @@ def add_bore(parent: mujoco.MjsBody, draw: ScrewDraw, mouth: Sequence[float]) ->
             friction=draw.friction,
             solref=SOLREF,
         )
-    parts.collider(
-        body,
-        mujoco.mjtGeom.mjGEOM_BOX,
-        (inner * 1.2, inner * 1.2, DRESSED_FLOOR / 2),
-        (0.0, 0.0, -draw.engaged - DRESSED_FLOOR / 2),
-        friction=draw.friction,
-        solref=SOLREF,
-    )
+    half = DRESSED_FLOOR / 2
+    size, pos = (inner * 1.2, inner * 1.2, half), (0.0, 0.0, -draw.engaged - half)
+    parts.collider(body, mujoco.mjtGeom.mjGEOM_BOX, size, pos, friction=draw.friction, solref=SOLREF)
 
 
 def loosened(

@@ -21,9 +21,7 @@ FOOT = 0.002
 """Radius of the balls that a mug stands on [m]."""
 MASSES: dict[str, float] = {kind: row["mass"] for kind, row in _DATA.items()}
 """Of a thing of stoneware, or full [kg]."""
-COLOURS: dict[str, list[tuple[float, float, float]]] = {
-    kind: [tuple(c) for c in row["colours"]] for kind, row in _DATA.items()
-}
+COLOURS: dict[str, list[tuple[float, float, float]]] = {k: [tuple(c) for c in r["colours"]] for k, r in _DATA.items()}
 """What they may look like (r, g, b)."""
 _BOX = mujoco.mjtGeom.mjGEOM_BOX
 _CYLINDER = mujoco.mjtGeom.mjGEOM_CYLINDER

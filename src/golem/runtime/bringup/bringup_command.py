@@ -40,10 +40,7 @@ class BringupReport:
     """The findings of one robot, kept in a folder."""
 
     def __init__(self, folder: Path, where: str) -> None:
-        """Go on from what the folder holds of the robot at `where`, if anything.
-
-        Raises ConfigError: its file cannot be read, or is about another robot.
-        """
+        """Go on from what the folder holds of the robot at `where`. Raises ConfigError: no file of that robot."""
         self._folder, self._where = folder, where
         self._entries: dict[str, Entry] = {}
         path = folder / FILE

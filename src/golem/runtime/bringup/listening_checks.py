@@ -57,11 +57,8 @@ def check_domain(bench: Workbench) -> StepFinding:
     if gates:
         return StepFinding(False, f"a gate is on the domain, end it first: {', '.join(gates)}")
     own = link.writers("/lowcmd")
-    return StepFinding(
-        True,
-        f"{bench.config.dds}; the robot is {robots[0]}",
-        {"others on the domain": float(link.others()), "other writers of /lowcmd": ", ".join(own) or "none"},
-    )
+    found = {"others on the domain": float(link.others()), "other writers of /lowcmd": ", ".join(own) or "none"}
+    return StepFinding(True, f"{bench.config.dds}; the robot is {robots[0]}", found)
 
 
 def _turns(states: Sequence[LowState]) -> float:

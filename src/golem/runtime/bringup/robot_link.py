@@ -79,10 +79,7 @@ class RobotLink:
     def spin(
         self, seconds: float, until: Callable[[], bool] = lambda: False, every: Callable[[], None] | None = None
     ) -> bool:
-        """Take what comes for `seconds`, or until `until()`; return whether that became true.
-
-        `every` is called after each look, at most every `PERIOD`.
-        """
+        """Take what comes for `seconds`, or until `until()`; return whether it is. `every` is called each `PERIOD`."""
         end = time.monotonic() + seconds
         while not until():
             if time.monotonic() >= end:

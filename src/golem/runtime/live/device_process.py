@@ -29,7 +29,7 @@ from golem.robots.sensors.cameras import CAMERAS
 from golem.runtime.live.clock import Every
 from golem.runtime.live.node_setup import AsyncLogger, log_line, member
 from golem.runtime.live.role_endpoints import RoleEndpoints
-from golem.types import TICK, HandCommand, Side
+from golem.types import TICK, Side
 
 SILENCE = 0.2
 """Time without a /clock after which nobody knows the robot's time [s]."""
@@ -166,7 +166,7 @@ class HandProcess(DeviceProcess):
         super().__init__(participant, node, {public.gripper(side, "state") for side in hands}, clock, tell)
         self._hands = hands
         for side in hands:
-            self.endpoints.listen(public.gripper(side, "command"), partial(self._command, side))
+            self.endpoints.listen(public.gripper(side, "command"), hands[side].command)
 
     def measured(self, now: float) -> Iterable[Measurement]:
         """Exchange what there is to exchange with each hand; see `DeviceProcess`."""
@@ -179,9 +179,6 @@ class HandProcess(DeviceProcess):
             if report is not None:
                 self.fault(f"{side} hand", "")
                 yield Measurement(public.gripper(side, "state"), report)
-
-    def _command(self, side: Side, command: HandCommand) -> None:
-        self._hands[side].command(command)
 
 
 class LidarProcess(DeviceProcess):
@@ -271,9 +268,7 @@ def run_hands(config: HandsConfig) -> None:
     if not ports:
         raise ConfigError("Name the port of a hand: --left.port /dev/ttyUSB0, --right.port /dev/ttyUSB1.")
     with ExitStack() as opened:
-        hands: dict[Side, MagpieServos] = {
-            side: opened.enter_context(closing(MagpieServos(hand))) for side, hand in ports.items()
-        }
+        hands: dict[Side, MagpieServos] = {s: opened.enter_context(closing(MagpieServos(h))) for s, h in ports.items()}
         words = f"Hands on {config.dds}: {', '.join(hands)}. Ctrl-C ends their driver; they keep what they hold."
         _drive("hands", config.dds, words, partial(HandProcess, hands=hands))
 

@@ -252,7 +252,7 @@ class SafetyProcess:
         if self._crowded:
             # Of two stacks, or two writers of commands, neither touches what the robot measures.
             faults.append(Fault(Reason.WRITERS, self._crowded, not self._crowded.startswith("/lowstate")))
-        doubts = [(self._estop_reason(), self._estop_fault())]
+        doubts = [(Reason.ESTOP_MISSING if self._frame is None else Reason.ESTOP_STALE, self._estop_fault())]
         if self._real:
             # A robot that moves is not dropped for its clock: the unit was right, and what arrives may be late.
             clock = "" if moving or self._arrivals.mode_machine is None else self._arrivals.rate.doubt()
@@ -260,9 +260,6 @@ class SafetyProcess:
             doubts += [(Reason.STATE_CLOCK, clock), (Reason.UNHEARD, self._unheard), (Reason.HELD, held)]
         faults += [Fault(reason, detail) for reason, detail in doubts if detail]
         return faults[::-1]  # of two that are alike the later tells an operator more
-
-    def _estop_reason(self) -> Reason:
-        return Reason.ESTOP_MISSING if self._frame is None else Reason.ESTOP_STALE
 
     def _estop_fault(self) -> str:
         """Return what the emergency stop says is wrong with it, once the gate counts it as silent."""

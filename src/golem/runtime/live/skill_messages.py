@@ -67,16 +67,12 @@ def _walk_goal(message: golem_interfaces.Walk_Goal, skill: str = "walk") -> tupl
     return skill, goal if timeout == 0.0 else goal | {"timeout": timeout}
 
 
-def _stand_goal(message: golem_interfaces.Stand_Goal) -> tuple[str, Fields]:
-    return "stand", {"seconds": convert.seconds(message.duration)}
-
-
 GOALS: dict[str, Callable[[Any], tuple[str, Fields]]] = {
     RUN: _run_goal,
     "/skill/pick": _pick_goal,
     "/skill/walk": _walk_goal,
     "/skill/navigate": partial(_walk_goal, skill="navigate"),
-    "/skill/stand": _stand_goal,
+    "/skill/stand": lambda message: ("stand", {"seconds": convert.seconds(message.duration)}),
 }
 """What reads the goals of each action; only a skill with an action of its own needs a line here."""
 
@@ -89,7 +85,7 @@ def skill_actions() -> dict[str, SkillAction]:
         kind = types[name]
 
         def result(ended: SkillResult) -> Any:
-            rest = (_value_text(ended),) if name == RUN else ()
+            rest = ("" if ended.value is None else json.dumps(plain(ended.value)),) if name == RUN else ()
             return kind.Result(result_message(ended), *rest)
 
         return SkillAction(GOALS[name], lambda said: kind.Feedback(feedback_message(said)), result)
@@ -102,10 +98,6 @@ def result_message(result: SkillResult) -> golem_interfaces.SkillResult:
     timings = [golem_interfaces.Timing(_text(name), float(s)) for name, s in result.timings.items()]
     stage, slot, reason = map(_text, (result.stage, result.slot or "", result.reason))
     return golem_interfaces.SkillResult(result.success, stage, slot, reason, timings)
-
-
-def _value_text(result: SkillResult) -> str:
-    return "" if result.value is None else json.dumps(plain(result.value))
 
 
 def feedback_message(feedback: Feedback) -> golem_interfaces.SkillFeedback:
@@ -128,12 +120,8 @@ def _text(text: str) -> str:
 
 def list_message(specs: Iterable[SkillSpec]) -> golem_interfaces.SkillList:
     """Return the skills that a stack offers."""
-    return golem_interfaces.SkillList(
-        [
-            golem_interfaces.SkillDescription(s.name, s.use, s.summary, json.dumps(s.goal), json.dumps(s.result))
-            for s in specs
-        ]
-    )
+    said = ((s.name, s.use, s.summary, json.dumps(s.goal), json.dumps(s.result)) for s in specs)
+    return golem_interfaces.SkillList([golem_interfaces.SkillDescription(*words) for words in said])
 
 
 def read_list(message: golem_interfaces.SkillList) -> dict[str, SkillSpec]:

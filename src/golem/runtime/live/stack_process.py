@@ -263,17 +263,9 @@ class StackProcess:
         if self.side is not None:
             self.side.memory.close()
         epoch = time.time() - t
-        side = self.side = StackNodes(
-            bus,
-            self._stack,
-            self._calibrated.merged(self._calibration),
-            self._calibrated.mount,
-            self._gantry,
-            0.0,
-            self._pools,
-            self._real,
-            epoch,
-        )
+        known, mount = self._calibrated.merged(self._calibration), self._calibrated.mount
+        side = StackNodes(bus, self._stack, known, mount, self._gantry, 0.0, self._pools, self._real, epoch)
+        self.side = side
         side.legs.realtime, side.running.live = self._real, True
         self._skills.attach(side)
         service, identities = self._service, Identities()

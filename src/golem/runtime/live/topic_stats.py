@@ -10,7 +10,6 @@ from tyro.conf import OmitArgPrefixes
 from golem.errors import ConfigError
 from golem.middleware.dds import discovery
 from golem.middleware.dds.base import Qos, Reader
-from golem.middleware.dds.discovery import Endpoint
 from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.dds.participant import CycloneParticipant
 from golem.middleware.ros import names
@@ -74,7 +73,8 @@ def run_topic_stats(config: TopicStatsConfig) -> None:
 def survey(participant: CycloneParticipant, seconds: float, everything: bool = False) -> list[Row]:
     """Return a row for each topic of the domain, after listening for some seconds; `participant` itself counts not."""
     time.sleep(DISCOVERY)
-    writers, readers = (_of_others(participant, f(participant)) for f in (discovery.writers, discovery.readers))
+    every = (discovery.writers(participant), discovery.readers(participant))
+    writers, readers = ([e for e in found if e.participant != participant.guid] for found in every)
     topics = {(e.topic, e.type_name) for e in (*writers, *readers) if everything or _is_topic(e.topic)}
     ears: dict[tuple[str, str], Reader] = {}
     known: set[str] = set()
@@ -106,7 +106,3 @@ def survey(participant: CycloneParticipant, seconds: float, everything: bool = F
 def _is_topic(wire: str) -> bool:
     kind, name = names.from_wire(wire)
     return kind == "topic" and "/_action/" not in name
-
-
-def _of_others(participant: CycloneParticipant, endpoints: list[Endpoint]) -> list[Endpoint]:
-    return [e for e in endpoints if e.participant != participant.guid]

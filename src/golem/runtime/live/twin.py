@@ -139,12 +139,8 @@ class Twin:
         self.commands = CommandIn(bus, endpoints, tell, patience)
         exposed = None if render_worker is not None else lambda camera: partial(images_wanted, endpoints, camera)
         side = RobotNodes(bus, stack, robot, exposed, partial(lidar_wanted, endpoints))
-        placed: list[Placed] = [
-            (Phase.RECEIVE, endpoints),
-            (Phase.RECEIVE, self.commands),
-            *side.nodes,
-            *outgoing(bus, endpoints, encoders(bus)),
-        ]
+        placed: list[Placed] = [(Phase.RECEIVE, endpoints), (Phase.RECEIVE, self.commands), *side.nodes]
+        placed += outgoing(bus, endpoints, encoders(bus))
         for service in (loco_service.SERVICE, stack_loco_api(stack).service):
             requests, responses = request_topic(service), response_topic(service)
             server = RpcServer(endpoints.reader(f"/{requests}"), endpoints.writer(f"/{responses}"))

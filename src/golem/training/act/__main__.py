@@ -139,9 +139,7 @@ def train_act(
     high, wide = data.features[video].shape[:2]
     size = width, round(width * high / wide)
     frames = [_frames(data, k, video, size, chunk) for k in range(len(data.episodes))]
-    learned, held = (
-        [torch.cat(parts) for parts in zip(*some, strict=True)] for some in (frames[:count], frames[count:])
-    )
+    learned, held = ([torch.cat(p) for p in zip(*some, strict=True)] for some in (frames[:count], frames[count:]))
     net = ActNetwork(len(SEEN), len(ACTION), chunk, size)
     for name, values in (("in", learned[0]), ("out", learned[2][learned[3] > 0.5])):
         getattr(net, f"mean_{name}").copy_(values.mean(0))

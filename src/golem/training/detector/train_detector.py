@@ -41,7 +41,7 @@ def load_onnx(model: PartNet, path: Path, classes: Sequence[str]) -> None:
     weights = {w.name: torch.from_numpy(numpy_helper.to_array(w).copy()) for w in network.graph.initializer}
     folded = [[weights[name] for name in n.input[1:]] for n in network.graph.node if n.op_type == "Conv"]
     layers = [m for m in model.modules() if isinstance(m, nn.Conv2d)]
-    norms = {id(block[0]): block[1] for block in model.modules() if _is_block(block)}
+    norms = {id(b[0]): b[1] for b in model.modules() if isinstance(b, nn.Sequential) and isinstance(b[0], nn.Conv2d)}
     if len(folded) != len(layers):
         raise ValueError(f"{path} has {len(folded)} convolutions; a part detector has {len(layers)}.")
     for layer, (weight, _) in zip(layers, folded, strict=True):
@@ -60,10 +60,6 @@ def load_onnx(model: PartNet, path: Path, classes: Sequence[str]) -> None:
             layer.weight.copy_(weight)
             norm = norms.get(id(layer))
             (layer if norm is None else norm).bias.copy_(bias)
-
-
-def _is_block(module: nn.Module) -> bool:
-    return isinstance(module, nn.Sequential) and isinstance(module[0], nn.Conv2d)
 
 
 LARGE = 15

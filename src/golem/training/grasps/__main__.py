@@ -75,10 +75,7 @@ class TrainScorerConfig:
 
 
 def auc(scores: NDArray[np.floating], held: NDArray[np.bool_]) -> float:
-    """Return the area under the ROC curve: how probably one that held scores above one that did not (Mann-Whitney).
-
-    nan where one of the two is missing.
-    """
+    """Return the area under the ROC curve: how probably what held scores above what did not (Mann-Whitney); or nan."""
     good, bad = int(held.sum()), int((~held).sum())
     if not good or not bad:
         return float("nan")

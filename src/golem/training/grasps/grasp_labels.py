@@ -337,10 +337,5 @@ def _read(path: Path) -> GraspLabels:
 
 def joined(parts: list[GraspLabels]) -> GraspLabels:
     """Return the labels of all of them."""
-    return GraspLabels(
-        np.concatenate([p.cells for p in parts]),
-        np.concatenate([p.facts for p in parts]),
-        np.concatenate([p.held for p in parts]),
-        np.concatenate([p.ware for p in parts]),
-        np.concatenate([p.kind for p in parts]),
-    )
+    rows = ((p.cells, p.facts, p.held, p.ware, p.kind) for p in parts)
+    return GraspLabels(*map(np.concatenate, zip(*rows, strict=True)))

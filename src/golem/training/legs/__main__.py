@@ -95,12 +95,9 @@ def shove(
 
 def main(args: list[str] | None = None) -> None:
     """Run the command line."""
-    tyro.extras.subcommand_cli_from_dict(
-        {"run": run, "export": export, "average": average, "curve": curve, "shove": shove},
-        prog="golem train legs",
-        args=args,
-        description="Train the leg policy.",
-    )
+    commands = {"run": run, "export": export, "average": average, "curve": curve, "shove": shove}
+    says = "Train the leg policy."
+    tyro.extras.subcommand_cli_from_dict(commands, prog="golem train legs", args=args, description=says)
 
 
 if __name__ == "__main__":

@@ -80,9 +80,7 @@ def draw_curves(runs: Sequence[Path], out: Path) -> None:
             rows = SMOOTH // curve.thin
             values = np.convolve(curve.columns[column], np.full(rows, 1.0 / rows), mode="valid")
             axes.plot(1e-6 * curve.columns["steps"][-len(values) :], values, color=colour)
-    figure.legend(
-        plots[0].get_lines(), [curve.name for curve in curves], loc="outside lower left", ncols=4, frameon=False
-    )
+    figure.legend(plots[0].get_lines(), [c.name for c in curves], loc="outside lower left", ncols=4, frameon=False)
     out.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(out)
     with table.open("w", newline="") as file:

@@ -155,7 +155,11 @@ class Ppo:
             for part in order.chunk(c.batches):
                 loss, value_loss, kl = self._loss([x[part] for x in flat], old_std, policy)
                 if policy:
-                    self._adapt(kl)
+                    group = self._optimiser.param_groups[0]
+                    if kl > 2.0 * self.config.kl:
+                        group["lr"] = max(group["lr"] / 1.5, 1e-5)
+                    elif 0.0 < kl < 0.5 * self.config.kl:
+                        group["lr"] = min(group["lr"] * 1.5, 5e-3)
                 self._optimiser.zero_grad(set_to_none=True)
                 loss.backward()
                 nn.utils.clip_grad_norm_(self._parameters, 1.0)
@@ -220,13 +224,6 @@ class Ppo:
             kl = (old_std.square() + (old_mean - mean).square()) / (2.0 * std.square()) - 0.5
             divergence = float((kl + torch.log(std / old_std)).sum(dim=-1).mean())
         return -surrogate + value_loss - c.entropy * entropy, float(value_loss.detach()), divergence
-
-    def _adapt(self, kl: float) -> None:
-        group = self._optimiser.param_groups[0]
-        if kl > 2.0 * self.config.kl:
-            group["lr"] = max(group["lr"] / 1.5, 1e-5)
-        elif 0.0 < kl < 0.5 * self.config.kl:
-            group["lr"] = min(group["lr"] * 1.5, 5e-3)
 
 
 def _log_prob(action: Tensor, mean: Tensor, log_std: Tensor) -> Tensor:

@@ -247,6 +247,4 @@ class Rewards:
         weighted = {name: getattr(w, name) * value for name, value in terms.items()}
         always = strictness * (weighted["fast"] + weighted["dragged"])
         total = np.asarray(sum(weighted.values()), dtype=np.float64) - always
-        return (np.maximum(total, 0.0) + always) * dt, {
-            name: float(v[np.isfinite(v)].mean()) for name, v in weighted.items()
-        }
+        return (np.maximum(total, 0.0) + always) * dt, {n: float(v[np.isfinite(v)].mean()) for n, v in weighted.items()}

@@ -128,12 +128,8 @@ class _Shard:
         if steps is None:
             steered = np.flatnonzero(rows["steered"])
             step = env.step(rows["action"], steered, rows["speeds"][steered])
-            rows["reward"], rows["ended"], rows["truncated"], terms = (
-                step.reward,
-                step.ended,
-                step.truncated,
-                step.terms,
-            )
+            rows["reward"], rows["ended"], rows["truncated"] = step.reward, step.ended, step.truncated
+            terms = step.terms
             rows["age"], rows["walking"], rows["stepping"] = env.age, env.walking, env.gait.stepping
             rows["error"] = np.linalg.norm((env.world.truth.heading_velocity() - env.twist)[:, :2], axis=1)
             env.restart(np.flatnonzero(step.ended | step.truncated))

@@ -67,18 +67,10 @@ def build_model() -> tuple[mujoco.MjModel, Ids]:
         foot = spec.body(f"{side}_ankle_roll_link")
         size = [0.5 * (SOLE.x[1] - SOLE.x[0]) + 0.03, 0.5 * (SOLE.y[1] - SOLE.y[0]) + 0.03, 0.05]
         foot.add_site(name=f"{side}_sole", pos=SOLE_CENTER, size=size, type=mujoco.mjtGeom.mjGEOM_BOX)
-        spec.add_sensor(
-            name=f"{side}_touch",
-            type=mujoco.mjtSensor.mjSENS_TOUCH,
-            objtype=mujoco.mjtObj.mjOBJ_SITE,
-            objname=f"{side}_sole",
-        )
-        spec.add_sensor(
-            name=f"{side}_sole_velocity",
-            type=mujoco.mjtSensor.mjSENS_FRAMELINVEL,
-            objtype=mujoco.mjtObj.mjOBJ_SITE,
-            objname=f"{side}_sole",
-        )
+        kinds = {"touch": mujoco.mjtSensor.mjSENS_TOUCH, "sole_velocity": mujoco.mjtSensor.mjSENS_FRAMELINVEL}
+        for name, kind in kinds.items():
+            site = mujoco.mjtObj.mjOBJ_SITE
+            spec.add_sensor(name=f"{side}_{name}", type=kind, objtype=site, objname=f"{side}_sole")
     spec.option.timestep = STEP
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     # Roughness moves the feet's spheres, but the midphase asks the volumes that were compiled around their old places.

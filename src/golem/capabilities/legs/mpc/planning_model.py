@@ -114,13 +114,9 @@ class PlanningModel:
         spec = _legs_spec(kp, kd, self.torque, timestep)
         mass, com, inertia = self._upper.inertial(np.zeros(NUM_JOINTS))
         xx, yy, zz = np.diag(inertia)
-        spec.body(BASE_LINK).add_body(
-            name=_UPPER_BODY,
-            mass=mass,
-            ipos=com,
-            fullinertia=[xx, yy, zz, inertia[0, 1], inertia[0, 2], inertia[1, 2]],
-            explicitinertial=True,
-        )
+        full = [xx, yy, zz, inertia[0, 1], inertia[0, 2], inertia[1, 2]]
+        base = spec.body(BASE_LINK)
+        base.add_body(name=_UPPER_BODY, mass=mass, ipos=com, fullinertia=full, explicitinertial=True)
         self._model = spec.compile()
         self._body = self._model.body(_UPPER_BODY).id
         self._data = mujoco.MjData(self._model)
@@ -215,12 +211,8 @@ class PlanningModel:
             foot = model.body(f"{side}_ankle_roll_link").id
             mujoco.mj_jac(model, data, jacobian, None, np.array([com[0], sole[1], sole[2]]), foot)
             tau -= 0.5 * weight @ jacobian
-        return Stance(
-            posture=data.qpos[self._qpos].copy(),
-            com_height=float(com[2] - soles[:, 2].mean()),
-            feet=soles[0, :2] - soles[1, :2],
-            tau=tau[self._qvel],
-        )
+        height, feet = float(com[2] - soles[:, 2].mean()), soles[0, :2] - soles[1, :2]
+        return Stance(posture=data.qpos[self._qpos].copy(), com_height=height, feet=feet, tau=tau[self._qvel])
 
 
 class _UpperBody:

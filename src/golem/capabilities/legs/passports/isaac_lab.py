@@ -67,9 +67,7 @@ def read(path: Path, data: Mapping[str, Any], network: Path | None) -> base.Pass
     )
     folder = path.parent
     places = [
-        p / name
-        for name in ("policy.onnx", "policy.pt")
-        for p in (folder / "exported", folder.parent / "exported", folder)
+        p / n for n in ("policy.onnx", "policy.pt") for p in (folder / "exported", folder.parent / "exported", folder)
     ]
     keys = KEYS | {str(i): str(own.get("name")) for i, own in enumerate(listed)}
     return base.Passport(NAME, path, description, network or base.first_file(places), tuple(assumed), keys)
