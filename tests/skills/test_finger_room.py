@@ -10,8 +10,8 @@ import pytest
 from golem.interfaces import topics
 from golem.robots.model.magpie_model import T_HAND_CAMERA, T_HAND_GRIPPER
 from golem.robots.sensors.cameras import RIGHT_HAND, rays
-from golem.skills.finger_room import ABOVE, PATIENCE, RAISED, SLOW, TIPS, TURNS, FingerRoom
-from golem.skills.poses import lifted
+from golem.skills.finger_room import ABOVE, ASIDE, PATIENCE, RAISED, SLOW, TIPS, TURNS, FingerRoom
+from golem.skills.poses import lifted, moved, turned
 from golem.types import Array, RgbdImage
 
 GAP, HIGH, TOP = 0.05, 0.12, 0.02
@@ -101,8 +101,11 @@ def test_beside_a_wall_the_fingers_fit_along_it(world: Any) -> None:
     seen, T = room(world, (0.02, 1.0))
     for k in range(round(2 * PATIENCE / world.context.period)):
         seen.way(lifted(T, 0.004), lifted(T, 0.10), 0.15)
-        assert not seen.across or k * world.context.period > PATIENCE - 0.02
-    assert seen.blocked and seen.across
+        assert seen.across is None or k * world.context.period > PATIENCE - 0.02
+    assert seen.blocked and seen.across is not None
+    turn = seen.across - np.arctan2(T[1, 0], T[0, 0])
+    assert 0.7 <= abs(turn) <= 0.5 * np.pi + 1e-6
+    assert max(seen.below(moved(turned(T, turn), aside * turned(T, turn)[:3, 0])) for aside in (0.0, *ASIDE)) > -0.004
 
 
 def test_between_walls_on_all_sides_no_finger_fits(world: Any) -> None:
@@ -111,13 +114,13 @@ def test_between_walls_on_all_sides_no_finger_fits(world: Any) -> None:
     seen._heights[walled] = TOP  # pyright: ignore
     for _ in range(round(2 * PATIENCE / world.context.period)):
         seen.way(lifted(T, 0.004), lifted(T, 0.10), 0.15)
-    assert seen.blocked and not seen.across
+    assert seen.blocked and seen.across is None
 
 
 def test_beside_a_wall_the_hand_keeps_aside_along_the_width_of_its_fingers(world: Any) -> None:
     seen, T = room(world, (-1.0, 1.0), x=(0.012, 1.0))
     goal, _ = seen.way(T, lifted(T, HIGH), 0.15)
-    assert not seen.blocked and not seen.across
+    assert not seen.blocked and seen.across is None
     np.testing.assert_allclose(goal[:2, 3], (T[:3, 3] + seen.shift)[:2])
     assert (T[:3, :3].T @ seen.shift)[0] in (pytest.approx(-0.004), pytest.approx(-0.007))
     assert seen.below(goal) > 0.0

@@ -5,6 +5,9 @@ Palm camera and fingers sit on one hand. What the head camera and the encoders a
 
 from __future__ import annotations
 
+import math
+from typing import cast
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -40,7 +43,7 @@ TURNS = (0.2, -0.2, 0.4, -0.4, 0.6, -0.6)
 """Turns about the vertical that are tried, in order, where the fingers have no room [rad]."""
 ASIDE = (0.004, -0.004, 0.007, -0.007)
 """How far the hand keeps aside along the width of its fingers, tried first [m]: pads of 24 mm hold a screw by half."""
-ACROSS = (0.5 * np.pi, -0.5 * np.pi)
+ACROSS = tuple(sign * float(turn) for turn in np.arange(0.7, 1.6, 0.1) for sign in (1.0, -1.0))
 """Turns of a hand that comes anew, for which a servo is too near [rad]: beside a wall the fingers fit along it."""
 WAYS = ((0.0, 0.0), *((0.0, aside) for aside in ASIDE), *((turn, 0.0) for turn in TURNS))
 """Turn [rad] and way aside [m] of the hand where its fingers have no room, in order."""
@@ -60,7 +63,7 @@ class FingerRoom:
     Attributes:
         blocked: whether something is in the way of the fingers at the last goal that was asked about, however the hand
             turns.
-        across: whether that has been so for a while, and the fingers would have room across.
+        across: heading with which the fingers would have room, where that has been so for a while [rad].
         shift: (3,) by how much the hand keeps aside of its goal, in odom [m].
     """
 
@@ -72,7 +75,7 @@ class FingerRoom:
         self._tips, self._around = _fingertips(gap, MARGIN), _fingertips(gap, CLOSE)
         self._turn = self._blocked_for = 0.0
         self._wanted = WAYS[0]
-        self.blocked = self.across = False
+        self.blocked, self.across = False, cast(float | None, None)
         self.shift: Array = np.zeros(3)
 
     def look(self) -> None:
@@ -108,8 +111,10 @@ class FingerRoom:
             self.blocked = False
         self._blocked_for = self._blocked_for + self._context.period if self.blocked else 0.0
         if self._blocked_for > PATIENCE:
+            self._blocked_for = 0.0
             ways = ((turn, aside) for turn in ACROSS for aside in (0.0, *ASIDE))
-            self.across = min(self._misses(T_goal, way) for way in ways) < 0.5 * ROUGH
+            free = next((turn for turn, aside in ways if self._misses(T_goal, (turn, aside)) < 0.5 * ROUGH), None)
+            self.across = None if free is None else math.atan2(T_goal[1, 0], T_goal[0, 0]) + free
         step = TURN_RATE * self._context.period
         turn, aside = self._wanted
         self._turn += min(max(turn - self._turn, -step), step)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 
@@ -14,7 +16,7 @@ from golem.interfaces import topics
 from golem.interfaces.payloads import GripState
 from golem.skills.base import SkillCancelled, SkillResult, StageFailed
 from golem.skills.context import Context
-from golem.skills.finger_room import ACROSS, FingerRoom
+from golem.skills.finger_room import FingerRoom
 from golem.skills.force_guard import CLOSED, ForceGuard
 from golem.skills.hand_offset import learn_offset, made_up
 from golem.skills.pack_view import see_fasteners
@@ -49,7 +51,7 @@ class Pick:
         self._travel: Travel
         self._report = PickReport()
         self._heights: list[float] = []
-        self._looks_again = self._across = False
+        self._looks_again, self._across = False, cast(float | None, None)
         self._off, self._sure, self._level, self._landmarks = np.zeros(3), False, False, np.zeros((0, 3))
         self._seen: Array | None = None
 
@@ -76,7 +78,7 @@ class Pick:
     async def _pursue(self, context: Context, goal: PickGoal) -> SkillResult:
         """Go through the stages, and home, whether they succeeded or not."""
         timings: dict[str, float] = {"start": context.t}
-        self._report, tried, self._across = PickReport(), list[Attempt](), False
+        self._report, tried, self._across = PickReport(), list[Attempt](), None
         result = SkillResult(True, "done", None, f"The {goal.label} was dropped in the {goal.container}.", timings)
         try:
             await self._travel.begin(self._config.travel_speed)
@@ -189,9 +191,9 @@ class Pick:
 
     async def _approach(self, context: Context, attempt: Attempt) -> Grasp:
         """Bring the open hand over the object, turned as it can be: first across, where else a finger has no room."""
-        yaw, refused = self._config.heading(attempt.side), list[StageFailed]()
-        for turn in (*(ACROSS if self._across else ()), *self._config.turns):
-            grasps = await context.propose(self._method, self._aim(attempt), attempt.side, yaw + turn)
+        refused, headings = list[StageFailed](), [self._config.heading(attempt.side) + t for t in self._config.turns]
+        for yaw in (*([] if self._across is None else (self._across, self._across - math.pi)), *headings):
+            grasps = await context.propose(self._method, self._aim(attempt), attempt.side, yaw)
             if not grasps:
                 raise StageFailed("approach", "grasp_method", f"No grasp was proposed for the {attempt.label}.")
             try:
@@ -253,7 +255,7 @@ class Pick:
                 context.say(failure.stage, f"{failure} Trying again.")
                 context.hands[attempt.side].open(grasp.gap)
                 await self._back_off(context, attempt.side)
-                if self._across:
+                if self._across is not None:
                     grasp = await self._approach(context, attempt)
                 else:
                     await self._above_again(context, attempt, grasp, failure.stage)
@@ -321,8 +323,8 @@ class Pick:
                     elif step.status is ServoStatus.STALLED:
                         text = "The hand makes no progress towards the target."
                         raise PickFailed(PickOutcome.OUT_OF_REACH, "servo", "upper_body", text)
-                if not closing and room.across and not self._across:
-                    self._across, text = True, "Something stands where a finger is to go. Across there is room."
+                if not closing and room.across is not None and self._across is None:
+                    self._across, text = room.across, "Something stands where a finger is to go. Across there is room."
                     raise PickFailed(PickOutcome.BLOCKED, "servo", "grasp_method", text)
                 if not closing and below():
                     text = f"The hand presses on something with {below.largest:.0f} N."
