@@ -68,6 +68,20 @@ def test_a_can_behind_a_bottle_is_a_can() -> None:
         assert np.linalg.norm(found[body.split("_")[0]][:2] - place) < 0.04
 
 
+@pytest.mark.parametrize("seed", [0, 3])
+def test_what_stands_on_a_counter_is_known_from_one_metre_away(seed: int) -> None:
+    """What counts as the counter's top grew with the squared distance: a bowl of 6.5 cm was within it."""
+    robot = MujocoRobot("field", seed, start_posture(), MujocoConfig(world="counter", stance=(0.6, 0.0, 0.0)))
+    try:
+        found = PlaneClusters().locate(picture(robot), LABELS)
+        things = [part for part in robot.scene.names.parts if part.label != "handle"]
+    finally:
+        robot.close()
+    assert len(things) == 4
+    for thing in things:
+        assert any(o.label == thing.label and np.linalg.norm((o.position - thing.position)[:2]) < 0.08 for o in found)
+
+
 def test_an_empty_plate_and_a_blind_camera_hold_nothing() -> None:
     image = samples.image(0.1)
     module = PlaneClusters()

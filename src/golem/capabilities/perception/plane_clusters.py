@@ -45,7 +45,8 @@ class PlaneClustersConfig:
 
     Attributes:
         stride: every how many pixels of rows and columns are looked at.
-        thick: what is nearer than this to a plane is on it at 0.5 m [m]; it grows with the squared distance.
+        thick: what is nearer than this to a plane is on it at 0.5 m [m]; it grows with the distance. Squared, as the
+            noise of stereo grows, it hid every bowl from 1 m on.
         planes: how many planes are looked for at most.
         share: least share of the points that makes a plane.
         wide: least standard deviation of a plane's piece along its shorter side, as a share of its distance.
@@ -108,7 +109,7 @@ class PlaneClusters:
         optical = rays(frame.info)[::s, ::s][valid].astype(np.float64) * depth[valid][:, None]
         T = frame.T_odom_optical
         points = optical @ T[:3, :3].T + T[:3, 3]
-        thick = c.thick * np.maximum(1.0, (depth[valid] / 0.5) ** 2)
+        thick = c.thick * np.maximum(1.0, depth[valid] / 0.5)
         planes, free = self._planes(points, thick, T[:3, 3], valid)
         off = np.zeros(valid.shape, np.uint8)
         off[valid] = free
