@@ -98,8 +98,8 @@ def before(here: PlanarPose, place: Array, distance: float) -> PlanarPose:
 
 NEAR = 1.3
 """Distance from a place within which the last steps go by the counter's edge [m]."""
-STAGE = 0.85
-"""Distance from a place to which the navigator goes [m]."""
+STAGE, CARRYING = 0.85, 1.1
+"""Distance from a place to which the navigator goes, and with an arm before the robot that holds something [m]."""
 SAME = 0.25
 """Places nearer than this to each other are looked at from one stance [m]."""
 ASIDE = 0.6
@@ -317,14 +317,14 @@ class Fetch:
                 return await self._try(context, goal, report, self._in_odom(context, place), True)
         return result
 
-    async def _go(self, context: Context, spot: Array) -> int:
-        """Bring the robot before a place in odom; returns how often it stepped."""
+    async def _go(self, context: Context, spot: Array, stage: float = STAGE) -> int:
+        """Bring the robot before a place in odom, first to the distance `stage` [m]; returns how often it stepped."""
         here = PlanarPose.of(context.legs.pose)
         away = math.hypot(float(spot[0]) - here.x, float(spot[1]) - here.y)
         # Arms that hold on to a place in odom would be left behind.
         context.release_arms()
         if away > NEAR:
-            await self._navigate(context, before(here, spot, STAGE))
+            await self._navigate(context, before(here, spot, stage))
         try:
             return await stand_before(context, spot)
         except StageFailed as failure:
@@ -356,7 +356,7 @@ class Fetch:
                 if to is None:
                     await self._navigate(context, home)
                 else:
-                    report.approaches += await self._go(context, self._in_odom(context, to))
+                    report.approaches += await self._go(context, self._in_odom(context, to), CARRYING)
             await context.sleep(context.period)
             await context.until(lambda: context.hands[side].status.holding, 2.0 * PATIENCE)
         if to is None:

@@ -58,6 +58,8 @@ LYING = 0.6
 """Share of its height below which a thing does not stand."""
 PICTURE = 2.0
 """Time that the head camera may take for a picture [s]."""
+STANDS = 0.2
+"""What stands at a place shows its sides up to here [m]; higher is the arm that holds a thing above it."""
 LEAD = 0.25
 """Share of the way down to the place on which the arm's own friction is felt."""
 TILT = 0.4
@@ -234,7 +236,7 @@ class SetDown:
         away = np.linalg.norm(scene[:, :2] - spot[:2], axis=1)
         if np.count_nonzero((scene[:, 2] < level - EDGE) & (away < goal.radius)) > MIN_POINTS:
             raise StageFailed("detect", "skill", "The surface ends within the width of what would stand at that place.")
-        proud = scene[(scene[:, 2] > level + PROUD) & (scene[:, 2] < level + 0.4), :2]
+        proud = scene[(scene[:, 2] > level + PROUD) & (scene[:, 2] < level + STANDS), :2]
         c = self._config
         # The head camera is off by centimetres: what looks too narrow for the thing may do, less than `room` does not.
         for room, beside in product((max(goal.radius + c.spare, c.room), c.room), BESIDE):
