@@ -416,14 +416,17 @@ def test_a_screw_lost_on_the_way(full: Any) -> None:
     assert_safe(full)
 
 
-def test_it_looks_afterwards_whether_the_screw_is_there(full: Any, thing: Any) -> None:
+@pytest.mark.parametrize("called", ["screw", "nut"])
+def test_it_looks_afterwards_whether_the_screw_is_there(full: Any, thing: Any, called: str) -> None:
+    """In the tray a camera may call it otherwise: where it is known which one is wanted, both count."""
+
     def seen() -> list[LocalizedObject]:
         dropped = "place" in full.stages and not full.holds
-        where = TRAY if dropped else SCREW
-        return [thing("screw", where + HEAD_ERROR, full.t), thing("tray", TRAY + HEAD_ERROR, full.t)]
+        name, where = (called, TRAY) if dropped else ("screw", SCREW)
+        return [thing(name, where + HEAD_ERROR, full.t), thing("tray", TRAY + HEAD_ERROR, full.t)]
 
     full.objects["head"] = seen
-    result = picked(full)
+    result = picked(full, wanted=tuple((SCREW + HEAD_ERROR)[:2].tolist()))
     assert result.success and "is seen there" in result.reason
     assert (result.value.in_tray, result.value.bore_empty) == ("yes", "yes")
 

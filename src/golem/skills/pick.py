@@ -97,7 +97,7 @@ class Pick:
         for side in _hands(goal, tried):
             await self._travel.home(side, self._config.travel_speed)
         if result.success:
-            await look_after(context, self._config, attempt, choice, self._report)
+            await look_after(context, self._config, attempt, choice, self._names, self._report)
             result = replace(result, reason=f"{result.reason[:-1]}{_seen(self._report)}.")
             context.say("done", result.reason)
         return replace(result, value=self._report)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import suppress
 
 import numpy as np
@@ -156,22 +157,22 @@ async def _middle(context: Context, config: PickConfig, attempt: Attempt) -> Arr
 
 
 async def look_after(
-    context: Context, config: PickConfig, attempt: Attempt, choice: PickChoice, report: PickReport
+    context: Context, config: PickConfig, attempt: Attempt, choice: PickChoice, names: Sequence[str], report: PickReport
 ) -> None:
-    """Look with the head camera at container and bore, and write into the report what it saw.
+    """Look with the head camera at container and bore for `names`, and write into the report what it saw.
 
     The object is in the container if something rises there now, or more such objects are seen there than before. Its
     place is empty if one of those that were seen around it before is seen no more.
     """
     frames: list[Array] = []
     clouds: list[Array] = []
-    with context.watch("head", attempt.label, attempt.container, doubtful=(attempt.container,)) as eye:
+    with context.watch("head", *names, attempt.container, doubtful=(attempt.container,)) as eye:
         end = context.t + config.look_timeout
         while len(frames) < config.looks_after:
             sightings = await eye.look(end - context.t)
             if sightings is None:
                 break
-            frames.append(positions(sightings, attempt.label))
+            frames.append(np.concatenate([positions(sightings, name) for name in names]))
             clouds += [o.points for o in sightings.objects if o.label == attempt.container]
     if not frames:
         return
