@@ -216,16 +216,11 @@ class Pick:
         target = attempt.target
         return replace(target, position=target.position + self._off, points=target.points + self._off)
 
-    @property
-    def _within(self) -> Array:
-        """How far the object may be from where it is expected, along x, y, z [m]."""
-        apart, level = np.array(EXPECTED), np.array([np.inf, np.inf, EXPECTED[2] if self._level else np.inf])
-        return apart if self._sure else level
-
     def _mine(self, attempt: Attempt, seen: Sequence[LocalizedObject]) -> list[LocalizedObject]:
         """Return what a palm camera shows that may be the object, under its label."""
         aim = attempt.target.position + self._off
-        mine = [one for one in seen if (np.abs(one.position - aim) < self._within).all()]
+        within = EXPECTED if self._sure else (np.inf, np.inf, EXPECTED[2] if self._level else np.inf)
+        mine = [one for one in seen if (np.abs(one.position - aim) < within).all()]
         return [called(one, attempt.label) for one in mine]
 
     async def _over(self, context: Context, attempt: Attempt, grasp: Grasp) -> None:
