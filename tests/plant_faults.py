@@ -91,8 +91,8 @@ FAULTS = {
     ),
     "skill-feels-late": PlantedFault(
         "skills/force_guard.py",
-        "self.stuck = force > self._force and",
-        "self.stuck = force > 3.0 * self._force and",
+        "self.stuck = force > limit and",
+        "self.stuck = force > 3.0 * limit and",
         ("tests/skills/test_force_guard.py",),
     ),
     "skill-follows-links": PlantedFault(

@@ -29,6 +29,18 @@ class Code:
     lines: int
 
 
+def parsed(text: str) -> ast.Module:
+    """Return the tree of a source.
+
+    CPython 3.11 counts the depth of trees for all threads at once: where another one compiles meanwhile it raises
+    SystemError (cpython#106905). Then it is parsed once more.
+    """
+    try:
+        return ast.parse(text)
+    except SystemError:
+        return ast.parse(text)
+
+
 def _imports(node: ast.AST) -> Iterator[str]:
     if isinstance(node, ast.Import):
         yield from (alias.name for alias in node.names)
@@ -46,7 +58,7 @@ def _dynamic(node: ast.AST) -> Iterator[str]:
 
 def parse(text: str) -> Code:
     """Return what a file with this text says."""
-    nodes = list(ast.walk(ast.parse(text)))
+    nodes = list(ast.walk(parsed(text)))
     return Code(
         frozenset(each for node in nodes for each in _imports(node)),
         frozenset(each for node in nodes for each in _dynamic(node)),

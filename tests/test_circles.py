@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from graphlib import CycleError, TopologicalSorter
 
 import pytest
-from tests.sources import FILES, SOURCE
+from tests.sources import FILES, SOURCE, parsed
 
 
 def imported_at_once(body: list[ast.stmt]) -> Iterator[str]:
@@ -38,11 +38,11 @@ def test_imports_have_no_circle() -> None:
         for path in FILES
         if path.name != "__init__.py"
     }
-    assert circle({name: {*imported_at_once(ast.parse(text).body)} for name, text in texts.items()}) == []
+    assert circle({name: {*imported_at_once(parsed(text).body)} for name, text in texts.items()}) == []
 
 
 @pytest.mark.parametrize(("b", "found"), [("import c", []), ("import a", ["a", "b", "a"])])
 def test_a_circle_is_found(b: str, found: list[str]) -> None:
-    imports = {"a": {*imported_at_once(ast.parse("from b import x").body)}, "c": set[str]()}
-    imports["b"] = {*imported_at_once(ast.parse(b).body)}
+    imports = {"a": {*imported_at_once(parsed("from b import x").body)}, "c": set[str]()}
+    imports["b"] = {*imported_at_once(parsed(b).body)}
     assert sorted(circle(imports)) == sorted(found)

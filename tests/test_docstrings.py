@@ -6,7 +6,7 @@ import ast
 import re
 from collections import defaultdict
 
-from tests.sources import SOURCE
+from tests.sources import SOURCE, parsed
 
 Methods = dict[str, bool]
 """Name of a method -> whether it has a docstring."""
@@ -15,7 +15,7 @@ Methods = dict[str, bool]
 def test_public_methods_say_what_they_do_or_inherit_it() -> None:
     own, bases, found = defaultdict[str, Methods](dict), defaultdict[str, set[str]](set), list[tuple[str, str, str]]()
     for path in sorted(SOURCE.rglob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in ast.walk(parsed(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.ClassDef):
                 bases[node.name] |= {name for base in node.bases if (name := _name(base))}
                 # The contracts that it keeps, too.

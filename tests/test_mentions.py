@@ -7,6 +7,8 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+from tests.sources import parsed
+
 ROOT = Path(__file__).resolve().parent.parent
 SOURCE = ROOT / "src" / "golem"
 PAGES = [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")]
@@ -24,7 +26,7 @@ OF_OTHERS = {"grasp_gen/serving/zmq_server.py", "isaaclab_ov/assets/articulation
 def members(path: Path) -> set[str]:
     """Return the names that a module defines or imports, and those of the classes and functions in it."""
     found: set[str] = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in ast.walk(parsed(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ClassDef | ast.FunctionDef):
             found.add(node.name)
         elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
@@ -77,7 +79,7 @@ def wrong(text: str) -> Iterator[str]:
 
 def docstrings(path: Path) -> Iterator[str]:
     """Yield every text in a module that stands by itself."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in ast.walk(parsed(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str):
             yield node.value.value
 

@@ -6,7 +6,7 @@ import ast
 from collections import Counter
 from pathlib import Path
 
-from tests.sources import FILES, code
+from tests.sources import FILES, code, parsed
 
 MESSAGES = "msgs"
 """Folder of the generated ROS messages, whose names are those of their packages."""
@@ -39,7 +39,7 @@ def test_no_file_name_occurs_twice() -> None:
 def given(text: str) -> list[str]:
     """Return the names that a module's text gives at its top, once for each time."""
     found = list[str]()
-    for node in ast.parse(text).body:
+    for node in parsed(text).body:
         if isinstance(node, ast.Assign):
             found += [
                 n.id

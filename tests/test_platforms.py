@@ -6,7 +6,7 @@ import ast
 from collections.abc import Iterator
 
 import pytest
-from tests.sources import FILES, SOURCE
+from tests.sources import FILES, SOURCE, parsed
 
 LINUX = {
     "os": "eventfd getxattr listxattr memfd_create pidfd_open posix_fadvise sched_getaffinity sched_setaffinity "
@@ -33,7 +33,7 @@ GUARDED = {
 
 def only_linux(text: str) -> Iterator[str]:
     """Yield what a source file names that only Linux has; `getattr` and `hasattr` look for themselves."""
-    for node in ast.walk(ast.parse(text)):
+    for node in ast.walk(parsed(text)):
         if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
             if node.attr in LINUX.get(node.value.id, "").split():
                 yield f"{node.value.id}.{node.attr}"
