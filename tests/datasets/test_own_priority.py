@@ -28,7 +28,7 @@ def test_an_encoder_leaves_no_thread_real_time(tmp_path: Path) -> None:
     for shade in range(40):
         video.add(np.full((64, 96, 3), shade, np.uint8))
     assert policies() <= before
-    video.finish()
+    video.finish(40)
     assert policies() <= before and (tmp_path / "a.mp4").stat().st_size > 0
 
 

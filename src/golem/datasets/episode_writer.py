@@ -55,7 +55,7 @@ class Video:
 
     def __init__(self, path: Path, feature: Feature, fps: int) -> None:
         os.environ.setdefault("SVT_LOG", "1")  # else the encoder writes a page to the terminal
-        self._av, self.counts, self._given, self._written = extra("av"), np.zeros((3, 256)), 0, 0
+        self._av, self.counts, self._written = extra("av"), np.zeros((3, 256)), 0
         self._out = self._av.open(str(path), "w")
         options = {"crf": f"{CRF}", "g": f"{GOP}", "preset": "11", "svtav1-params": LEVEL}
         self._stream = self._out.add_stream(CODEC, rate=fps, options=options)
@@ -67,16 +67,15 @@ class Video:
     def add(self, picture: NDArray[Any]) -> None:
         """Append one picture (height, width, 3)."""
         self._write(self._av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), "rgb24"))
-        self._given += 1
         for channel in range(3):
             self.counts[channel] += np.bincount(picture[::LOOK, ::LOOK, channel].ravel(), minlength=256)
 
-    def finish(self) -> None:
-        """Complete the file; an OSError if the encoder kept a picture to itself."""
+    def finish(self, length: int) -> None:
+        """Complete the file of `length` pictures; an OSError if the encoder kept one to itself."""
         self._write(None)
         self._out.close()
-        if self._written != self._given:
-            raise OSError(f"the encoder gave {self._written} of {self._given} pictures")
+        if self._written != length:
+            raise OSError(f"the encoder gave {self._written} of {length} pictures")
 
     def _write(self, frame: Any) -> None:
         """Encode a frame, or what is left, and write it: each packet shows one picture."""
@@ -177,7 +176,7 @@ class DatasetWriter:
                 self._table.close()
                 stats = {name: schema.statistics(np.array(rows)) for name, rows in self._kept.items()}
                 for name, video in self._videos.items():
-                    video.finish()
+                    video.finish(self.length)
                     stats[name] = schema.picture_statistics(video.counts, self.length)
                 videos = {name: self._folder / f"{name}.mp4" for name in self._videos}
                 new = Draft([self._task], self.length, self._folder / "data.parquet", videos, stats)

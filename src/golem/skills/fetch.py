@@ -337,14 +337,9 @@ class Fetch:
         (await context.run("navigate", goal)).check("navigator")
 
     async def _bring(
-        self,
-        context: Context,
-        goal: FetchGoal,
-        report: FetchReport,
-        walks: bool,
-        home: PlanarPose,
+        self, context: Context, goal: FetchGoal, report: FetchReport, walks: bool, home: PlanarPose,
         to: PlanarPose | None,
-    ) -> str:
+    ) -> str:  # fmt: skip
         """Carry it to where it is wanted; returns a sentence."""
         taken = report.taken
         side: Side = "left" if taken.side == "left" else "right"

@@ -6,7 +6,6 @@ Palm camera and fingers sit on one hand. What the head camera and the encoders a
 from __future__ import annotations
 
 import math
-from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,7 +74,8 @@ class FingerRoom:
         self._tips, self._around = _fingertips(gap, MARGIN), _fingertips(gap, CLOSE)
         self._turn = self._blocked_for = 0.0
         self._wanted = WAYS[0]
-        self.blocked, self.across = False, cast(float | None, None)
+        self.blocked = False
+        self.across: float | None = None
         self.shift: Array = np.zeros(3)
 
     def look(self) -> None:
@@ -95,8 +95,8 @@ class FingerRoom:
     def way(self, T_goal: Array, T_now: Array, speed: float) -> tuple[Array, float]:
         """Return where a hand that is to go to `T_goal` shall go, and how fast it may [m/s].
 
-        Where something is in the way of the fingers at the goal, the hand turns until they have room, and stays above
-        until then; where no turn gives room, `blocked` is set.
+        Where something is in the way of the fingers at the goal, the hand keeps aside or turns until they have room,
+        and stays above until then; where none of `WAYS` gives room, `blocked` is set.
 
         Args:
             T_goal: (4, 4) where the servo wants the hand, in odom.
@@ -113,14 +113,13 @@ class FingerRoom:
         if self._blocked_for > PATIENCE:
             self._blocked_for = 0.0
             ways = ((turn, aside) for turn in ACROSS for aside in (0.0, *ASIDE))
-            free = next((turn for turn, aside in ways if self._misses(T_goal, (turn, aside)) < 0.5 * ROUGH), None)
-            self.across = None if free is None else math.atan2(T_goal[1, 0], T_goal[0, 0]) + free
+            free = next((way for way in ways if self._misses(T_goal, way) < 0.5 * ROUGH), None)
+            self.across = None if free is None else math.atan2(T_goal[1, 0], T_goal[0, 0]) + free[0]
         step = TURN_RATE * self._context.period
         turn, aside = self._wanted
         self._turn += min(max(turn - self._turn, -step), step)
-        T = turned(T_goal, self._turn)
-        self.shift = aside * T[:3, 0]
-        T = moved(T, self.shift)
+        T = _varied(T_goal, (self._turn, aside))
+        self.shift = T[:3, 3] - T_goal[:3, 3]
         missing = -self.below(T)
         up = ABOVE + missing if missing > ROUGH else min(max(KEPT + missing, 0.0), RAISED)
         T = lifted(T, up)
@@ -129,8 +128,7 @@ class FingerRoom:
 
     def _misses(self, T_goal: Array, way: tuple[float, float]) -> float:
         """Return by how much fingers miss the room they need at a goal (4, 4), turned and aside as in `WAYS` [m]."""
-        T = turned(T_goal, way[0])
-        return -self.below(moved(T, way[1] * T[:3, 0]))
+        return -self.below(_varied(T_goal, way))
 
     def below(self, T: Array) -> float:
         """Return how far the fingertips of a hand at `T` (4, 4) in odom are above what is below them [m].
@@ -149,6 +147,12 @@ class FingerRoom:
     def _cells(self, points: Array) -> NDArray[np.int64]:
         """Return the (n, 2) cells of points (n, 3) in odom."""
         return np.floor((points[:, :2] - self._middle) / CELL).astype(np.int64) + HALF
+
+
+def _varied(T_goal: Array, way: tuple[float, float]) -> Array:
+    """Return a goal (4, 4) turned and aside by a `way`, as in `WAYS`."""
+    T = turned(T_goal, way[0])
+    return moved(T, way[1] * T[:3, 0])
 
 
 def _fingertips(gap: float, margin: float) -> Array:

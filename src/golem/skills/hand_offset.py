@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from golem.skills.context import Context
+from golem.skills.pick_targets import positions
 from golem.types import Array, Side
 
 FARTHEST: Array = np.array([0.1, 0.1, 0.05])
@@ -31,8 +32,7 @@ async def learn_offset(context: Context, side: Side, names: Sequence[str], known
     """Look down with a hand; return its `hand_offset` against `known` (n, 3), where the head camera has a list."""
     with context.watch(f"{side}_hand", *names, doubtful=tuple(names)) as eye:
         sightings = await eye.look(LOOK)
-    seen = [one.position for one in sightings.objects if one.label in names] if sightings else []
-    return hand_offset(np.array(seen).reshape(-1, 3), known)
+    return None if sightings is None else hand_offset(positions(sightings, names), known)
 
 
 def hand_offset(seen: Array, known: Array) -> Array | None:

@@ -203,9 +203,8 @@ class PackJob:
 
     def _level(self, one: PackFastener) -> float:
         """Return how high a fastener stands in odom, as the head camera sees it [m]."""
-        return (
-            float(self._context.T_odom_base[2, 3]) + self._rim.at(one.place) - self._context.legs.height + one.listed.z
-        )
+        above = self._rim.at(one.place) - self._context.legs.height + one.listed.z
+        return float(self._context.T_odom_base[2, 3]) + above
 
     async def _find(self) -> None:
         """Find the pack by the edge that the robot stands before."""
@@ -314,9 +313,10 @@ class PackJob:
         """Look whether a fastener that may be anywhere is in its place: what is seen nearer to another is that."""
         there, container, T = self._in_odom(one)[None], self._container(one.label), self._context.T_odom_base
         seen = await see_fasteners(self._context, one.label, container, NOTHING, False, there)
-        known = np.array([self._in_odom(other) for other in self._left])
+        left = self._left
+        known = np.array([self._in_odom(other) for other in left])
         away = np.linalg.norm((seen.places @ T[:3, :3].T + T[:3, 3])[:, None, :2] - known, axis=2)
-        return any(self._left[int(k)] is one for k in away.argmin(axis=1))
+        return any(left[int(k)] is one for k in away.argmin(axis=1))
 
     async def _take(self, one: PackFastener, side: Side) -> PickOutcome:
         """Try one fastener, and keep what came of it."""
@@ -325,10 +325,8 @@ class PackJob:
         (x, y), name = self._in_odom(one).tolist(), container if listed is None else listed.name
         at = () if listed is None else tuple(self._in_odom(listed).tolist())
         off = tuple(self._off[side].tolist()) if side in self._off else ()
-        near = [
-            f for f in self._book.fasteners if f.fate is not Fate.IN_TRAY and math.dist(f.place, one.place) < AROUND
-        ]
-        marks = tuple(v for f in near for v in (*self._in_odom(f).tolist(), self._level(f)))
+        near = [other for other in self._left if math.dist(other.place, one.place) < AROUND]
+        marks = tuple(v for other in near for v in (*self._in_odom(other).tolist(), self._level(other)))
         goal = PickGoal(one.label, container, side, (), (x, y), (self._level(one),), at, off, marks)
         result = await self._context.run("pick", goal)
         found = result.value if isinstance(result.value, PickReport) else PickReport()

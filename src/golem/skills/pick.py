@@ -6,7 +6,6 @@ import math
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
-from typing import cast
 
 import numpy as np
 
@@ -51,8 +50,9 @@ class Pick:
         self._travel: Travel
         self._report = PickReport()
         self._heights: list[float] = []
-        self._looks_again, self._across = False, cast(float | None, None)
-        self._off, self._sure, self._level, self._landmarks = np.zeros(3), False, False, np.zeros((0, 3))
+        self._looks_again = False
+        self._across: float | None = None
+        self._goal, self._off, self._sure = PickGoal(), np.zeros(3), False
         self._seen: Array | None = None
 
     def timeout(self, goal: PickGoal) -> float:
@@ -63,7 +63,7 @@ class Pick:
         """Pick one object with whatever grasp method the stack chose; see `Skill`."""
         self._method, self._names = context.grasp_method(), names_of(goal.label, goal.wanted)
         self._off, self._sure = np.array([*(goal.off or (0.0, 0.0)), 0.0]), bool(goal.off)
-        self._landmarks, self._level = np.array(goal.landmarks).reshape(-1, 3), bool(goal.level)
+        self._goal = goal
         await self._choose_height(context, goal)
         lines = LineTravel(context, self._config.travel_height, self._config.tolerance)
         planned = self._config.travel == "planned"
@@ -206,9 +206,11 @@ class Pick:
 
     async def _learn(self, context: Context, attempt: Attempt) -> None:
         """Learn what the hand's own camera is off by, where one object is wanted and may be taken for its neighbour."""
-        if not self._sure and len(self._landmarks):
-            off = await learn_offset(context, attempt.side, self._names, self._landmarks)
-            self._off, self._sure = (self._off, False) if off is None else (off, True)
+        known = np.array(self._goal.landmarks).reshape(-1, 3)
+        if not self._sure and len(known):
+            off = await learn_offset(context, attempt.side, self._names, known)
+            if off is not None:
+                self._off, self._sure = off, True
         self._report.off = tuple(self._off[:2].tolist()) if self._sure else ()
 
     def _aim(self, attempt: Attempt) -> LocalizedObject:
@@ -219,7 +221,7 @@ class Pick:
     def _mine(self, attempt: Attempt, seen: Sequence[LocalizedObject]) -> list[LocalizedObject]:
         """Return what a palm camera shows that may be the object, under its label."""
         aim = attempt.target.position + self._off
-        within = EXPECTED if self._sure else (np.inf, np.inf, EXPECTED[2] if self._level else np.inf)
+        within = EXPECTED if self._sure else (np.inf, np.inf, EXPECTED[2] if self._goal.level else np.inf)
         mine = [one for one in seen if (np.abs(one.position - aim) < within).all()]
         return [called(one, attempt.label) for one in mine]
 

@@ -172,7 +172,7 @@ async def look_after(
             sightings = await eye.look(end - context.t)
             if sightings is None:
                 break
-            frames.append(np.concatenate([positions(sightings, name) for name in names]))
+            frames.append(positions(sightings, names))
             clouds += [o.points for o in sightings.objects if o.label == attempt.container]
     if not frames:
         return

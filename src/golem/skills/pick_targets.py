@@ -373,6 +373,6 @@ def _missing(outcome: PickOutcome, what: str) -> PickFailed:
     return PickFailed(outcome, "detect", "localizer", f"The head camera shows no {what}.")
 
 
-def positions(sightings: Detections, label: str) -> Array:
-    """Return (n, 3) where the objects of a class are, in odom [m]."""
-    return np.array([o.position for o in sightings.objects if o.label == label]).reshape(-1, 3)
+def positions(sightings: Detections, labels: Sequence[str]) -> Array:
+    """Return (n, 3) where the objects of some classes are, in odom [m]."""
+    return np.array([o.position for o in sightings.objects if o.label in labels]).reshape(-1, 3)

@@ -331,22 +331,24 @@ class SetDown:
         context.say("lower", "Lowering it.", side=side)
         await arm.settle(0.006, 1.0)
         guard = await ForceGuard.at_rest(context, side, np.array([0.0, 0.0, -1.0]), c.contact, lead=LEAD * c.hover)
+
+        def stops() -> bool:
+            return guard() or not hand.status.holding
+
         T = arm.commanded.copy()
         T[2, 3] = level + (goal.below or c.unknown) - c.lower
         for further in (0.0, c.deeper):
             T[2, 3] -= further
-            await arm.move(T, c.lower_speed, stop=lambda: guard() or not hand.status.holding)
+            await arm.move(T, c.lower_speed, stop=stops)
             if not guard.stuck and arm.commanded[2, 3] - T[2, 3] > 2.0 * c.lower:
                 await hold()
-                await arm.move(T, c.lower_speed, stop=lambda: guard() or not hand.status.holding)
+                await arm.move(T, c.lower_speed, stop=stops)
             if guard.stuck or not hand.status.holding:
                 break
         else:
             await arm.move(lifted(T, c.hover + c.lower + c.deeper), c.lower_speed)
-            away = 100 * (c.lower + c.deeper)
-            raise StageFailed(
-                "lower", "localizer", f"No surface was felt to {away:.0f} cm below where it was seen; it stays held."
-            )
+            away = f"{100 * (c.lower + c.deeper):.0f} cm below where it was seen"
+            raise StageFailed("lower", "localizer", f"No surface was felt to {away}; it stays held.")
         self._report.touched = guard.stuck
         if guard.stuck:
             # What presses on the surface springs back: give way by what the arm is behind.

@@ -139,15 +139,11 @@ class ErrandsRung(KitchenRung[ErrandsOptions]):
 
     def arranged(self, spec: TrialSpec, stack: Stack) -> Stack:
         """Return the stack of one errand; see `KitchenRung`."""
-        if self.options.calibrated:
-            stack = calibrated(stack, episode_seed(spec.seed, spec.index), self.options.calibrated)
-        own = SUITE[str(spec.case["errand"])].get("stack")
-        if own is None:
-            return stack
-        chosen = load_stack(own, profile=spec.profile).with_options("robot", layout=self.options.layout)
-        kept = {name: part for name, part in stack.parts.items() if name == "calibration"}
-        choices = {**chosen.choices, "memory": stack.choice("memory")}
-        return replace(chosen, choices=choices, parts={**chosen.parts, **kept})
+        own, keep = SUITE[str(spec.case["errand"])].get("stack"), self.options.calibrated
+        if own is not None:
+            chosen = load_stack(own, profile=spec.profile).with_options("robot", layout=self.options.layout)
+            stack = replace(chosen, choices={**chosen.choices, "memory": stack.choice("memory")})
+        return calibrated(stack, episode_seed(spec.seed, spec.index), keep) if keep else stack
 
     def errand(
         self, spec: TrialSpec, running: LockstepRunner, robot: MujocoRobot, kitchen: KitchenLayout, oracle: Oracle
