@@ -202,23 +202,19 @@ def test_what_lasts_too_long_is_left_to_the_gate(what: str) -> None:
     pytest.fail(f"The stage never left the gate its tick: {what}.")
 
 
-def test_legs_that_rest_in_the_hoist_are_ordinary_but_for_the_looks() -> None:
-    """Targets that stay the same are no fault where no foot carries, but only a look tells whether one does."""
+def test_legs_that_rest_in_the_hoist_are_ordinary() -> None:
+    """Targets that stay the same are no fault where no foot carries."""
     bench = Bench()
     stage, record = bench.activate(), new_shared()
-    rests, codes = bench.gate.memory.command, list[int]()
+    rests = bench.gate.memory.command
     assert rests is not None
     for _ in range(500):
         inputs = changed(command_q=lambda q: np.concatenate((rests.q[LEGS], q[LEGS.stop :])))(bench.inputs())
         put(record, inputs)
-        codes.append(stage.stage.run(record))
+        assert stage.stage.run(record) != UNUSUAL
         result = bench.gate.step(inputs)
         assert result.state is GateState.ACTIVE
-        if codes[-1] == UNUSUAL:
-            assert stage.take(bench.gate.memory)
-        else:
-            assert numbers(command_of(record["command"][0], inputs.t)) == numbers(result.command)
-    assert 0 < codes.count(UNUSUAL) <= 110
+        assert numbers(command_of(record["command"][0], inputs.t)) == numbers(result.command)
 
 
 @pytest.mark.parametrize("mode", [GateState.INIT, GateState.ARMED, GateState.STOP1, GateState.STOP2])

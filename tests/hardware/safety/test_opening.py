@@ -162,3 +162,13 @@ def test_every_state_that_arrives_is_integrated(bench: Any, state_at: Make) -> N
             result = bench.tick(state=replace(newest[1], t=bench.t + 0.002), tick=newest[0], earlier=tuple(states))
             found = found or result.reason
         assert found is (Reason.STATE_IMPLAUSIBLE if drifts else None)
+
+
+def test_what_legs_were_told_in_the_air_does_not_count(walking: Any, monkeypatch: Any) -> None:
+    """One spoilt sample that looks like a foot on the ground makes no hung policy of legs that rest in a hoist."""
+    monkeypatch.setattr("golem.hardware.safety.senses.carried", lambda balance: False)
+    k, result = stopped(walking, lambda k: living(walking, 60), 200)
+    assert (k, result.reason) == (200, None)
+    monkeypatch.undo()
+    k, result = stopped(walking, lambda k: living(walking, 60), 200)
+    assert result.reason is Reason.COMMAND_HUNG and 30 <= k <= 60

@@ -16,7 +16,7 @@ from golem.robots.model.table import JOINT_INDEX
 from golem.types import LEGS, LowState
 
 KNEE = 3
-BALANCE = (*SENDER, *LIMITS, Reason.BALANCE, Reason.COMMAND_HUNG)
+BALANCE = (*SENDER, *LIMITS, Reason.COMMAND_HUNG)
 LYING = (
     *LIMITS,
     Reason.STATE_FROZEN,

@@ -29,7 +29,7 @@ _VENDOR = load_limits("urdf")
 TORQUE, SPEED, UPPERMOST = _VENDOR.torque, _VENDOR.velocity, _VENDOR.upper
 """Maxima of the joints that a command may well ask for [N m, rad/s, rad]."""
 DAMAGED, INVALID = (Reason.COMMAND_DAMAGED,), (Reason.COMMAND_DAMAGED, Reason.COMMAND_INVALID)
-LIMITS = (Reason.POSITION, Reason.VELOCITY, Reason.TORQUE, Reason.BRAKING, Reason.TILT)
+LIMITS = (Reason.POSITION, Reason.VELOCITY, Reason.TORQUE, Reason.BRAKING, Reason.TILT, Reason.BALANCE)
 """Reasons of a robot that was moved beyond what it may do."""
 SENDER = (Reason.COMMAND_GAINS, Reason.COMMAND_JOLTS, Reason.COMMAND_BEYOND)
 

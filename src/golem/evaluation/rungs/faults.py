@@ -57,7 +57,7 @@ class FaultFinding:
         effort: greatest predicted torque of a command, by the limit.
         moved: greatest distance of a joint from where it was [rad].
         fell: whether the robot lies or hangs in its fall.
-        unstopped: whether it fell while commands passed, or passed again.
+        unstopped: whether it was down while commands reached the motors; a gate that is held up lets none through.
         unsafe: what was wrong with a command that reached the motors; empty where nothing was.
     """
 
@@ -122,7 +122,7 @@ class Judge:
         w, x, y, z = data.qpos[3:7]
         tilt = math.acos(max(-1.0, min(1.0, 1.0 - 2.0 * (x * x + y * y))))
         fallen = tilt > 1.0 or float(data.qpos[2]) < 0.7 * self._height
-        found.unstopped = found.unstopped or (fallen and status.state is GateState.ACTIVE)
+        found.unstopped |= fallen and status.state is GateState.ACTIVE and rig.told is not None
         found.fell = found.fell or fallen
 
     def _unsafe(self, command: LowCommand, state: GateState) -> str:

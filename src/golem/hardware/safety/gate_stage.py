@@ -165,6 +165,8 @@ def pass_command(r: Record, m: Record) -> bool:
     # From here on the tick is ordinary, and is remembered.
     if looks:
         remember_look(r, m, out)
+    if same and m.balance.airborne > AIRBORNE:
+        moved = r.request_t
     for i in range(_N):
         numbers[5 * _N + i], numbers[6 * _N + i] = r.q[i], r.dq[i]
         for k in range(4):

@@ -37,7 +37,7 @@ class SenderMemory:
         firm: whether legs have been stiff, or fed forward, since the activation.
         refused: commands in a row that were not followed.
         jolts: level of the jumps of torque.
-        moved: stamp of the newest command whose legs have other targets than the one before [s].
+        moved: stamp of the newest command whose legs have other targets than the one before, or are in the air [s].
         moves: how many such there were with no longer a pause than `hung / 2`, at most `LIVELY`.
     """
 
@@ -64,8 +64,8 @@ def examine_command(
     Returns:
         The new memory, whether the command is to be followed, and the fault if it is not finite or one has persisted.
     """
-    moved, moves, hung = _answers(new, memory, limits)
-    if hung and carries:
+    moved, moves, hung = _answers(new, memory, limits, carries)
+    if hung:
         said = f"12 targets of the legs are the same for {(new.t - moved) * 1e3:.0f} ms"
         return memory, False, Fault(Reason.COMMAND_HUNG, said)
     if memory.last is not None and _ordinary(new, memory.last, limits):
@@ -124,11 +124,16 @@ def ungrasped(new: LowCommand, limits: SafetyLimits) -> tuple[NDArray[np.bool_],
     return ~(new.kd >= limits.least_kd), soft
 
 
-def _answers(new: LowCommand, m: SenderMemory, limits: SafetyLimits) -> tuple[float, int, bool]:
-    """Return the next `moved` and `moves`, and whether the legs' targets hang; sensors that stand still excuse it."""
+def _answers(new: LowCommand, m: SenderMemory, limits: SafetyLimits, carries: bool) -> tuple[float, int, bool]:
+    """Return the next `moved` and `moves`, and whether the legs' targets hang.
+
+    Sensors that stand still excuse it. Legs in the air may be told the same for ever: that time does not count.
+    """
     if m.last is None or _differs(new, m.last, limits):
         lively = new.t - m.moved <= 0.5 * limits.hung
         return new.t, min(m.moves + 1, LIVELY) if lively else 0, False
+    if not carries:
+        return new.t, m.moves, False
     return m.moved, m.moves, limits.frozen > 0.0 and m.moves == LIVELY and new.t - m.moved > limits.hung
 
 
