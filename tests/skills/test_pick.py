@@ -142,7 +142,15 @@ def test_what_the_head_camera_does_not_see_is_looked_for_by_the_hand_where_it_is
     seen = full.objects["head"]
     full.objects["head"] = lambda: [one for one in seen() if one.label != "screw"]
     failed(picked(full, wanted=here), "detect", "localizer", "no reachable", "nothing_there")
+    tick, texts = full.step, set[str]()
+
+    def step() -> None:
+        tick()
+        texts.add(full.bus.latest(topics.FEEDBACK).text)
+
+    full.step = step
     assert picked(full, wanted=here, level=(level,)).success
+    assert not any("Looking around" in text for text in texts)
 
 
 def test_a_neighbour_is_not_taken_where_it_is_known_what_the_palm_camera_is_off_by(full: Any, thing: Any) -> None:

@@ -158,6 +158,8 @@ WANTED = 0.045
 """How far from where it is wanted, or listed, the head camera may show an object [m]: half a pitch."""
 LEVEL = 0.04
 """How far above or below its level an object may be seen [m]: those of a real pack are 65 mm apart."""
+FRAMES = 5
+"""Frames after which an object of a list that they do not show is not waited for."""
 BESIDE = 0.12
 """How far from where it is known to be a container may be seen [m]: half a length, they stand side by side."""
 ALIKE = {"screw": ("nut",), "nut": ("screw",)}
@@ -239,12 +241,10 @@ class TargetChoice:
             PickFailed: something is missing, or out of reach, or the container is full.
         """
         context.say("detect", f"Looking for a {goal.label} and a {goal.container}.")
-        view = await self._see(context, goal, _View())
+        view = self._or_listed(context, goal, await self._see(context, goal, _View()))
         blind = view.problem is not None and view.problem.outcome is PickOutcome.FAILED
         if not blind and not self._enough(goal, view) and self._config.turn > 0.0:
-            view = await self._look_around(context, goal, view)
-        if view.problem is not None and view.problem.outcome is PickOutcome.NOTHING_THERE and goal.level:
-            view = self._added(context, goal, view, _as_listed(context.t, goal))
+            view = self._or_listed(context, goal, await self._look_around(context, goal, view))
         if view.problem is not None:
             raise view.problem
         assert view.container is not None  # it would be the problem
@@ -266,6 +266,12 @@ class TargetChoice:
         text = f"{len(view.attempts)} {goal.label}s in reach."
         context.say("detect", text, target=chosen[0].target.position.tolist())
         return PickChoice(chosen, view.container, np.array([o.position for o in view.objects]))
+
+    def _or_listed(self, context: Context, goal: PickGoal, view: _View) -> _View:
+        """Return the view with what is wanted where it is listed, if it shows nothing there: the hand looks better."""
+        if view.problem is None or view.problem.outcome is not PickOutcome.NOTHING_THERE or not goal.level:
+            return view
+        return self._added(context, goal, view, _as_listed(context.t, goal))
 
     async def _look_around(self, context: Context, goal: PickGoal, view: _View) -> _View:
         """Turn the torso to either side until enough is seen, and back; the arms come along."""
@@ -310,12 +316,12 @@ class TargetChoice:
         )
         names = names_of(goal.label, goal.wanted)
         with context.watch("head", *names, goal.container, doubtful=(goal.container,)) as eye:
-            end = context.t + self._config.look_timeout
-            while view.problem is not None:
+            end, frames = context.t + self._config.look_timeout, 0
+            while view.problem is not None and not (goal.level and view.container and frames >= FRAMES):
                 sightings = await eye.look(end - context.t)
                 if sightings is None:
                     break
-                view = self._added(context, goal, view, sightings)
+                view, frames = self._added(context, goal, view, sightings), frames + 1
         return view
 
     def _added(self, context: Context, goal: PickGoal, view: _View, sightings: Detections) -> _View:
@@ -363,7 +369,7 @@ class TargetChoice:
 
 
 def _as_listed(t: float, goal: PickGoal) -> Detections:
-    """Return what is wanted as if it were seen where it is listed: a hand looks better at what is low and near."""
+    """Return what is wanted as if it were seen where it is listed."""
     position, nowhere = np.array([*goal.wanted[:2], goal.level[0]]), np.zeros(2)
     there = LocalizedObject(Detection(goal.label, 0.0, np.zeros(4), nowhere), t, position, position[None])
     return Detections(t, "head", (there,))
