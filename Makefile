@@ -3,8 +3,11 @@
 BIN := .venv/bin
 # Without what Python keeps of a file that it has compiled, every process of the tests spends seconds on compiling.
 export PYTHONDONTWRITEBYTECODE :=
-# Types are checked on one core while the kernels are compiled on the other.
+# Types are checked on one core while the kernels are compiled on the other. Their lines are kept whole. Any other
+# target must show at once what it says, e.g. the address of the live view.
+ifneq ($(filter test,$(MAKECMDGOALS)),)
 MAKEFLAGS += --jobs=2 --output-sync=line
+endif
 
 .PHONY: help demo test test-slow test-long kernels lint format docs release lock venv venv-isaac clean
 

@@ -278,3 +278,14 @@ def test_help_lists_the_rungs_and_what_each_can_be_told(fake: Make, capsys: pyte
     said = capsys.readouterr().out
     assert "visual_servo, or yours" in said and "climb" in said and "Pick a screw" in said
     assert "--skill FLOAT" in said
+
+
+def test_help_imports_every_rung_and_needs_no_extra() -> None:
+    absent = ("mcap", "cyclonedds", "dask", "viser", "matplotlib", "mcp", "pyarrow", "gymnasium")
+    code = f"""
+import sys
+sys.modules.update(dict.fromkeys({absent!r}))
+from golem.evaluation.harness.ladder import read_ladder
+read_ladder(["--rung", "tether"])
+"""
+    subprocess.run([sys.executable, "-c", code], check=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -137,6 +138,7 @@ def truth(
         # A servo law's command is as far from hand and screw as the arm errs, which says nothing of the miss.
         ("grasp", "grasp_method", truth(aim=0.026, reach=0.025, miss=0.02, told=0.02, left=0.001), "localizer"),
         ("grasp", "grasp_method", truth(aim=0.026, reach=0.025, miss=0.02, told=0.001, left=0.02), "upper_body"),
+        ("extract", "grasp_method", replace(truth(aim=0.5, miss=0.5), strayed=0.2), "grasp_method"),
     ],
 )
 def test_the_larger_error_takes_the_blame(stage: str, slot: str, seen: GraspTruth | None, culprit: str) -> None:

@@ -59,7 +59,7 @@ def run_new(config: NewConfig, folder: Path = Path()) -> list[Path]:
         raise OutputError(f"Nothing can be written into {folder}: {error.strerror}.") from error
     print(f"Wrote {', '.join(path.name for path in files)}. Next:")
     print(f"  golem check {slot} {name}.py:{words['cls']}")
-    print(f"  pytest test_{name}.py")
+    print(f"  python -m pytest test_{name}.py    # needs pytest: pip install pytest")
     print("  " + texts["run"].get(slot, "golem run {name}.yaml").format(**words))
     if slot in texts["compare"]:
         print("  " + texts["compare"][slot].format(**words))

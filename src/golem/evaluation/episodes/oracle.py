@@ -153,6 +153,7 @@ class GraspTruth:
         left: from there to the hand [m]: what the arm, or the servo law, left over.
         calibration: what `told` owes to the calibration of that camera [m].
         seen: what `told` would be without that [m].
+        strayed: from where the skill sent a servo law to where the law went [m].
     """
 
     aim: float
@@ -164,6 +165,7 @@ class GraspTruth:
     left: float
     calibration: float = 0.0
     seen: float = 0.0
+    strayed: float = 0.0
 
 
 class Oracle:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -116,7 +117,7 @@ class PickWatch(ErrandWatch):
         self._side: Side = "right"
         self._attempt = 0
         self._stage = ""
-        self._servoed = False
+        self._servoed, self._aim, self._strayed = False, np.zeros(2), 0.0
 
     def due(self) -> float:
         """Return when it has to look again [s]; the way of a hand that pulls is kept by the tick."""
@@ -139,17 +140,20 @@ class PickWatch(ErrandWatch):
             self.pull = [] if self._stage == "extract" else self.pull
         if feedback.stage == "approach" and "side" in feedback.data:
             self._side, self._attempt = feedback.data["side"], feedback.data["attempt"] - 1
-            self._servoed = False
+            self._servoed, self._aim, self._strayed = False, np.array(feedback.data["target"][:2]), 0.0
         self._servoed = self._servoed or feedback.stage == "servo"
         if feedback.stage in LOOKING:
             # What it looks at is as far from the true hand as it believes it to be from the hand.
             looked = np.subtract(feedback.data["target"], feedback.data["hand"]) if "hand" in feedback.data else 0.0
+            if "hand" in feedback.data:
+                self._strayed = float(np.linalg.norm(feedback.data["target"][:2] - self._aim))
             if self._attempt not in self.looked_at or "hand" in feedback.data:
                 self.looked_at[self._attempt] = self._oracle.gripper(self._side)[:3, 3] + looked
         if feedback.stage == "grasp" and not feedback.data.get("failed"):
             # Where it servoed, the camera in the palm sent the hand, else that of the head.
             camera = f"{self._side}_hand" if self._servoed else "head"
             looked_at = self.looked_at.get(self._attempt) if self._servoed else None
-            self.grasp = self._oracle.grasp(self._side, self._running.commanded(self._side), camera, looked_at)
+            grasp = self._oracle.grasp(self._side, self._running.commanded(self._side), camera, looked_at)
+            self.grasp = replace(grasp, strayed=self._strayed)
         if feedback.stage == DONE or feedback.data.get("failed"):
             self.picture = self._oracle.picture()

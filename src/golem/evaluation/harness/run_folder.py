@@ -185,6 +185,10 @@ def finished_records(folder: Path) -> list[TrialRecord]:
         ConfigError: it holds no trials.
     """
     trials = folder / "trials.jsonl"
+    if not folder.is_dir():
+        raise ConfigError(
+            f"{folder} holds no trials: no such folder; give the --out folder of a golem ladder or a golem study."
+        )
     if not trials.is_file():
         raise ConfigError(f"{folder} holds no trials; give the --out folder of a golem ladder or a golem study.")
     held = os.open(folder, os.O_RDONLY)

@@ -21,7 +21,6 @@ from golem.interfaces import lidar_convert, public
 from golem.interfaces.lidar import ExternalOdometry, LegOdometry, LidarImu, LidarScan
 from golem.middleware.bags.base import BagMessage
 from golem.middleware.bags.recorder import topic
-from golem.middleware.bags.writer import BagConfig, BagWriter
 from golem.middleware.ros import codec
 from golem.provenance import stack_facts
 from golem.runtime.contract_check import ContractCheck
@@ -41,6 +40,8 @@ class WalkBag:
 
     def __init__(self, folder: Path, walk: lidar_walk.LidarWalk) -> None:
         """Begin the bag `folder` for `walk`. Raises MissingExtra, OutputError: there can be no such bag."""
+        from golem.middleware.bags.writer import BagConfig, BagWriter  # the extra `record`: no other rung needs it
+
         kinds = {name: public.topic(name).type for name in public.LIDAR}
         self._topics = {name: topic(name, kind) for name, kind in {**kinds, "/odom": ODOMETRY, TRUTH: ODOMETRY}.items()}
         self._walk, self._legs = walk, 0

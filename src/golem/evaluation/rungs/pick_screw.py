@@ -46,6 +46,8 @@ from golem.types import SIDES, Array, Side
 
 PAD_REACH = 0.008
 """Half width of a finger pad [m]: a hand further off than this cannot hold the screw."""
+STRAYED = 0.1
+"""A servo law this far from where it was sent has another object [m] [own: the palm camera is up to 7 cm off]."""
 STRAIGHT = 0.087
 """Tilt beyond which an extraction counts as off axis [rad]: 5 deg."""
 CALIBRATION = "calibration"
@@ -57,12 +59,15 @@ def blame(stage: str, slot: str | None, truth: GraspTruth | None, drop_inside: f
 
     Where the hand missed the screw, the larger of the two errors is to blame: where the camera had the screw, or what
     was left from there to the hand (the arm and its calibration). The first is again the larger of two: the camera's
-    calibration, or what was seen (perception). Where it did not miss, an off-axis pull is the arm's; a hand that lets
-    go beside the tray, `drop_inside` [m] within its rim, was sent there by perception; and the rest is the grip's.
+    calibration, or what was seen (perception). A servo law that went to another object than it was sent to has missed
+    by itself. Where it did not miss, an off-axis pull is the arm's; a hand that lets go beside the tray, `drop_inside`
+    [m] within its rim, was sent there by perception; and the rest is the grip's.
     """
     if truth is None or stage in ("detect", "servo", "safety", FAULT):
         return slot
     if truth.miss > PAD_REACH:
+        if truth.strayed > STRAYED:
+            return "grasp_method"
         if truth.told < truth.left:
             return "upper_body"
         return CALIBRATION if truth.calibration > truth.seen else "localizer"

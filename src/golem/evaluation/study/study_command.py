@@ -15,7 +15,7 @@ from tyro.conf import Positional, arg
 
 from golem.errors import ConfigError, MissingExtra, OutputError
 from golem.evaluation.base import rung_class
-from golem.evaluation.harness.ladder import prepare, run_ladder
+from golem.evaluation.harness.ladder import LadderInterrupted, prepare, run_ladder
 from golem.evaluation.harness.run_folder import RunFolder, read_costs
 from golem.evaluation.metrics.anytime import ALPHA, anytime_p, equal_within, paired_evidence
 from golem.evaluation.metrics.results import trials_csv
@@ -177,7 +177,10 @@ def run_study_command(config: StudyConfig) -> Study | None:
         print(plan_table(study, cells, family(study, cells)).terminal(120))
         return None
     with RunFolder(out):
-        return run_cells(config, study, cells, out)
+        try:
+            return run_cells(config, study, cells, out)
+        except LadderInterrupted:
+            raise LadderInterrupted(f"Stopped; finished trials are kept; continue with: {config.command()}") from None
 
 
 def run_cells(config: StudyConfig, study: StudyFile, cells: Sequence[Cell], out: Path) -> Study:

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, Literal, cast
 
+import yaml
+
 from golem.errors import ConfigError, unknown_name
 from golem.evaluation.base import rung_class
 from golem.evaluation.harness.ladder import LadderConfig
@@ -32,7 +34,7 @@ class StudyEntry:
     """
 
     rung: Any
-    method: tuple[str, ...] = ()
+    method: tuple[Any, ...] = ()
     name: str = ""
     n: int | None = None
     best_n: int | None = None
@@ -135,7 +137,7 @@ def _ladder(
         raise ConfigError(f"The seed of a cell is a whole number, not {seed!r}.")
     return LadderConfig(
         str(rung),
-        entry.method,
+        tuple(_method(method) for method in entry.method),
         entry.n or study.n,
         None if profile is None else str(profile),
         seed,
@@ -145,6 +147,15 @@ def _ladder(
         score=study.score,
         options=fill(f"option of rung {rung}", kind.Options, options),
     ).whole()
+
+
+def _method(value: Any) -> str:
+    """Return a method as `golem ladder` takes it: options may stand in the file as a mapping, as in a stack file."""
+    if isinstance(value, Mapping):
+        return yaml.safe_dump(value, default_flow_style=True, sort_keys=False, width=10_000).strip()
+    if not isinstance(value, str):
+        raise ConfigError(f"A method is a name, file.py:Class, or {{use: NAME, option: value}}; not {value!r}.")
+    return value
 
 
 def _several(value: Any) -> list[Any]:
