@@ -382,6 +382,26 @@ def test_empty_grips_are_a_failure_after_a_second_look(full: Any) -> None:
     assert_safe(full)
 
 
+@pytest.mark.parametrize("method", [Centroid(), VisualServo()], ids=lambda method: type(method).__name__)
+def test_after_a_failure_the_hand_goes_straight_up_before_anything_else(method: GraspMethod, full: Any) -> None:
+    """Between walls, fingers that open wide or move sideways press on them."""
+    full.grips, tick, told = [False] * 9, full.step, list[tuple[float, float | None]]()
+
+    def step() -> None:
+        tick()
+        goal = full.bus.latest(topics.hand_goal("right"))
+        told.append((float(full.context.arms["right"].commanded[2, 3]), goal and goal.gap))
+
+    full.step = step
+    failed(picked(full, method), "grasp", "grasp_method", "hold nothing")
+    path = np.array([T[:3, 3] for T in full.sent])
+    lowest = len(path) - 1 - int(np.argmin(path[::-1, 2]))
+    up = path[lowest:][: int(np.argmax(path[lowest:, 2] > path[lowest, 2] + 0.9 * CONFIG.clearance))]
+    assert len(up) > 10 and np.ptp(up[:, :2], axis=0).max() < 1e-3
+    low = [gap for height, gap in told if gap is not None and height < path[lowest, 2] + 0.5 * CONFIG.clearance]
+    assert low and max(low) < CONFIG.release_gap
+
+
 def test_what_the_fingers_missed_is_taken_after_a_second_look(full: Any) -> None:
     full.grips = [False, False, True]
     result = picked(full)

@@ -183,9 +183,6 @@ class Pick:
                     raise
                 self._note(failure)
                 context.say(failure.stage, f"{failure} Leaving it for the next {attempt.label}.")
-                if not refused:
-                    context.hands[attempt.side].open(self._config.release_gap)
-                    await self._back_off(context, attempt.side)
                 if left[0].side != attempt.side and context.arms[attempt.side].sent:
                     await self._travel.home(attempt.side, self._config.travel_speed)
 
@@ -247,11 +244,12 @@ class Pick:
                 await pull(context, self._config, self._travel, attempt, -grasp.T_odom_gripper[:3, 2], self._heights)
                 return
             except StageFailed as failure:
-                if law is None or count == self._config.attempts or outcome_of(failure) in FINAL:
+                last = law is None or count == self._config.attempts or outcome_of(failure) in FINAL
+                if not last:
+                    context.say(failure.stage, f"{failure} Trying again.")
+                await self._back_off(context, attempt.side, grasp.gap)
+                if last:
                     raise
-                context.say(failure.stage, f"{failure} Trying again.")
-                context.hands[attempt.side].open(grasp.gap)
-                await self._back_off(context, attempt.side)
                 if self._across is not None:
                     grasp = await self._approach(context, attempt)
                 else:
@@ -353,9 +351,10 @@ class Pick:
             text = f"The fingers hold nothing (gap {status.gap * 1e3:.0f} mm)."
             raise PickFailed(PickOutcome.NOTHING_THERE, "grasp", "grasp_method", text)
 
-    async def _back_off(self, context: Context, side: Side) -> None:
-        """Go straight up, away from what was not taken, with the fingers open."""
+    async def _back_off(self, context: Context, side: Side, gap: float) -> None:
+        """Go straight up, away from what was not taken, the fingers no wider open than they came: walls are near."""
         arm = context.arms[side]
+        context.hands[side].open(gap)
         await arm.move(lifted(arm.commanded, self._config.clearance), self._config.travel_speed)
 
 
