@@ -1,8 +1,7 @@
 """One robot on its feet under judgement: the whole stack in lock-step, pushed and watched from outside.
 
-It is an error model, no sensor. With the source `estimator` it adds noise to what the base estimator says: drift and
-all, nothing the robot could not know. With `truth` it adds the noise to where the robot really is, which is what a
-LiDAR odometry without drift would tell; nothing measured with that says how well the robot finds its way by itself.
+Its odometry is an error model, no sensor: it adds noise to what the base estimator says, drift and all, nothing the
+robot could not know.
 """
 
 from __future__ import annotations
@@ -10,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -32,8 +31,6 @@ from golem.skills.runner import SkillRun
 from golem.stack import Choice, Stack, load_stack
 from golem.types import Array, Twist
 
-Source = Literal["estimator", "truth"]
-
 POSITION_NOISE = 0.01
 """Standard deviation of x and of y [m]."""
 YAW_NOISE = float(np.radians(1.0))
@@ -47,10 +44,9 @@ ODOMETRY_LATENCY = 0.05
 class SimulatedOdometry:
     """Publishes `topics.ODOMETRY` for a twin; call it after every tick."""
 
-    def __init__(self, bus: Bus, robot: MujocoRobot, source: Source, rng: np.random.Generator) -> None:
-        """Tell `bus` where `robot` is by `source`, with independent noise of every pose drawn from `rng`."""
-        self._bus, self._robot, self._source, self._rng = bus, robot, source, rng
-        self._T_odom_world = np.linalg.inv(robot.truth.T_world_odom)
+    def __init__(self, bus: Bus, rng: np.random.Generator) -> None:
+        """Tell `bus` where the base estimator has the robot, with independent noise of every pose drawn from `rng`."""
+        self._bus, self._rng = bus, rng
         self._next = 0.0
 
     @property
@@ -65,13 +61,10 @@ class SimulatedOdometry:
         self._next = t + PERIOD
         dx, dy = self._rng.normal(0.0, POSITION_NOISE, 2)
         turn = self._rng.normal(0.0, YAW_NOISE)
-        if self._source == "truth":
-            T = self._T_odom_world @ self._robot.truth.base().T_world_base
-        else:
-            base = self._bus.latest(topics.BASE)
-            if base is None:
-                return
-            T = base.T_odom_base.copy()
+        base = self._bus.latest(topics.BASE)
+        if base is None:
+            return
+        T = base.T_odom_base.copy()
         c, s = np.cos(turn), np.sin(turn)
         noise = np.eye(3)
         noise[:2, :2] = ((c, -s), (s, c))
@@ -211,9 +204,9 @@ class Episode:
         """Begin a skill; it advances while the episode runs."""
         self._skill = self.running.start(skill, goal)
 
-    def locate(self, odometry: SimulatedOdometry) -> None:
-        """Let `odometry` publish where the robot is, from now on."""
-        self._odometry = odometry
+    def locate(self, rng: np.random.Generator) -> None:
+        """Let a `SimulatedOdometry` with noise from `rng` say where the robot is, from now on."""
+        self._odometry = SimulatedOdometry(self.running.bus, rng)
 
     @property
     def result(self) -> SkillResult | None:

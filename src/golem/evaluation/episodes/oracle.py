@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -126,14 +125,6 @@ def whereabouts(robot: MujocoRobot) -> list[Whereabouts]:
                 one = Whereabouts(slot, kind, True, "tray", tray.name, right)
         found.append(one)
     return found
-
-
-def counted(found: Sequence[Whereabouts]) -> dict[str, float]:
-    """Return how many loosened fasteners of each kind are where, as `screw_tray`, and `KIND_right` of those."""
-    loose = [one for one in found if one.loose]
-    counts = Counter(f"{one.kind}_{one.where}" for one in loose)
-    counts.update(f"{one.kind}_right" for one in loose if one.right)
-    return {name: float(count) for name, count in sorted(counts.items())}
 
 
 @dataclass(frozen=True, slots=True)

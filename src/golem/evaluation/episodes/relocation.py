@@ -184,7 +184,6 @@ class Relocation:
         observations: the looks, in the order of time.
         split: how many of them are from before it was moved last.
         at_old: whether the target stood at its old place, `before[0]`, at each look; else it stood at `after[0]`.
-        moved_at: time at which the target was moved last [s].
     """
 
     target: str
@@ -194,7 +193,6 @@ class Relocation:
     observations: tuple[Observation, ...]
     split: int
     at_old: tuple[bool, ...]
-    moved_at: float
 
 
 def relocation(rng: np.random.Generator, setting: Setting) -> Relocation:
@@ -218,7 +216,7 @@ def relocation(rng: np.random.Generator, setting: Setting) -> Relocation:
         at_old += [old] * VIEWS
         looks += _walk(rng, room, setting, start)
         start = looks[-1].frame.t + pause
-    split, moved_at = len(looks), start - pause / 2
+    split = len(looks)
     heading = float(counters[0]) * np.pi / 2
     # 16 cm before it, as seen from the middle of the room.
     before = spots[0][0] - 0.16 * np.array([np.cos(heading), np.sin(heading), 0.0])
@@ -227,7 +225,7 @@ def relocation(rng: np.random.Generator, setting: Setting) -> Relocation:
     looks += _walk(rng, RelocationRoom(after, clutter, screens, setting.dusk), setting, start)
     before = (Thing(target, spots[0][0]), *others)
     at_old += [False] * VIEWS
-    return Relocation(target, before, after, absent, tuple(looks), split, tuple(at_old), moved_at)
+    return Relocation(target, before, after, absent, tuple(looks), split, tuple(at_old))
 
 
 def _elsewhere(rng: np.random.Generator, count: int, labels: Sequence[str]) -> list[Observation]:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from golem.evaluation.base import DONE, TrialOutcome, TrialSpec
-from golem.evaluation.episodes.episode import Episode, Loss, SimulatedOdometry
+from golem.evaluation.episodes.episode import Episode, Loss
 from golem.evaluation.episodes.last_seconds import FilmStrip
 from golem.evaluation.rungs.leg_rung import NO_WALKER, LegRung, PlantOptions
 from golem.interfaces import topics
@@ -43,8 +43,7 @@ class NavigateLine(LegRung[LineOptions]):
     """Walk 6 m straight ahead over the open floor, by odometry; the error is that of the true pose.
 
     No LiDAR odometry takes part: the robot goes by its base estimator, to whose pose a noise of 1 cm and 1 deg is
-    added (`golem.evaluation.episodes.episode`, source `estimator`). The drift of legs and IMU over the line
-    is in the error.
+    added (`golem.evaluation.episodes.episode`). The drift of legs and IMU over the line is in the error.
     """
 
     name = "navigate-line"
@@ -56,8 +55,7 @@ class NavigateLine(LegRung[LineOptions]):
             if episode.running.envelope.vx[1] <= 0.0:
                 why = "It does not walk: the greatest forward speed in its envelope is zero."
                 return TrialOutcome(False, NO_WALKER, f"lower_body: {spec.method}", why)
-            odometry = SimulatedOdometry(episode.running.bus, episode.robot, "estimator", spec.rng("odometry"))
-            episode.locate(odometry)
+            episode.locate(spec.rng("odometry"))
             strip = FilmStrip(episode.robot, 0.0)
             episode.stand(SETTLE)
             if not episode.over:

@@ -13,7 +13,7 @@ import numpy as np
 from golem.capabilities.legs.base import Envelope
 from golem.errors import unknown_name
 from golem.evaluation.base import TrialOutcome, TrialSpec
-from golem.evaluation.episodes.episode import Episode, Loss, SimulatedOdometry
+from golem.evaluation.episodes.episode import Episode, Loss
 from golem.evaluation.episodes.scripted_motion import ArmMotion, ScriptedMotion
 from golem.evaluation.rungs.leg_rung import LegRung, PlantOptions, can_walk, judged, no_walker
 from golem.provenance import stack_facts
@@ -170,8 +170,8 @@ class WalkStop(LegRung[PlantOptions]):
     walks = True
 
     def trial(self, spec: TrialSpec, episode: Episode) -> TrialOutcome:
-        goal, noise = draw(spec.rng("goal")), spec.rng("odometry")
-        episode.locate(SimulatedOdometry(episode.running.bus, episode.robot, "estimator", noise))
+        goal = draw(spec.rng("goal"))
+        episode.locate(spec.rng("odometry"))
         episode.stand(SETTLE)
         if episode.loss is not None:
             return judged(spec.method, episode.loss, {})
