@@ -105,11 +105,6 @@ def test_a_run_is_reproduced_by_its_seed_and_goes_on_from_its_checkpoint(
         rows = list(csv.DictReader(file))
     assert {row["run"] for row in rows} == set("abc")
     assert float(rows[0]["steps"]) == read_curve(tmp_path / "a")["steps"][0]
-    draw_curves([curves / "curve.csv:b", tmp_path / "a"], tmp_path / "again.png")
-    with (tmp_path / "again.csv").open() as file:
-        assert [row for row in csv.DictReader(file) if row["run"] == "b"] == [r for r in rows if r["run"] == "b"]
-    with pytest.raises(ConfigError, match="Unknown run of .*curve.csv 'd'; valid: a, b, c"):
-        draw_curves([curves / "curve.csv:d"], tmp_path / "again.png")
 
 
 def test_rows_of_the_curve_that_are_learned_again_are_left_out(tmp_path: Path) -> None:

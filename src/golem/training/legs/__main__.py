@@ -57,7 +57,7 @@ def curve(runs: tyro.conf.Positional[tuple[Path, ...]], out: Path = RUNS / "curv
     """Draw the learning curves of several runs beside each other, and tabulate every fifth update.
 
     Args:
-        runs: folders of `run`, or TABLE.csv:RUN for one of an earlier table.
+        runs: folders of `run`.
         out: the picture; the table is the CSV file beside it.
     """
     draw_curves(runs, out)

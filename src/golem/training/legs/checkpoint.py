@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
 
-from golem.errors import ConfigError, unknown_name
+from golem.errors import ConfigError
 from golem.types import Array
 
 CHECKPOINT = "checkpoint.pt"
@@ -33,30 +32,13 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
 
 def read_curve(run: Path) -> dict[str, Array]:
     """Return the columns of the learning curve in the folder `run`. Raises ConfigError: it is absent or empty."""
-    return _columns(run / CURVE, _rows(run / CURVE))
-
-
-def read_table(table: Path, name: str) -> dict[str, Array]:
-    """Return the columns of the run `name` in a table of `draw_curves`. Raises ConfigError: there is none."""
-    runs: dict[str, list[dict[str, str]]] = {}
-    for row in _rows(table):
-        runs.setdefault(row.pop("run", ""), []).append(row)
-    if name not in runs:
-        raise unknown_name(f"run of {table}", name, runs)
-    return _columns(table, runs[name])
-
-
-def _rows(path: Path) -> list[dict[str, str]]:
+    path = run / CURVE
     try:
         with path.open() as file:
-            return list(csv.DictReader(file))
+            rows = list(csv.DictReader(file))
+        return {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
     except OSError as error:
         raise ConfigError(f"The curve {path} cannot be read: {error.strerror}; name folders of runs.") from error
-
-
-def _columns(path: Path, rows: Sequence[Mapping[str, str]]) -> dict[str, Array]:
-    try:
-        return {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
     except (IndexError, KeyError, ValueError, TypeError) as error:
         raise ConfigError(f"{path} is no learning curve of 'golem train legs run'.") from error
 

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from golem.errors import ConfigError
 from golem.figures import blank_figure
-from golem.training.legs.checkpoint import CURVE, read_curve, read_table
-from golem.types import Array
+from golem.training.legs.checkpoint import CURVE, read_curve
 
 PANELS = (
     ("survival", "how much of its episode a robot survives", 1.0),
@@ -35,23 +33,6 @@ SMOOTH = 10
 COLOURS = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#888888", "#000000")
 
 
-@dataclass(frozen=True, slots=True)
-class Curve:
-    """One run: its name in the picture, its `columns` of one value per row, `thin` updates per row."""
-
-    name: str
-    columns: dict[str, Array]
-    thin: int
-
-    @classmethod
-    def of(cls, run: Path) -> Curve:
-        """Return the curve of a run's folder, or of TABLE.csv:RUN. Raises ConfigError: there is none."""
-        table, colon, name = str(run).rpartition(":")
-        if colon and table.endswith(".csv"):
-            return cls(name, read_table(Path(table), name), THIN)
-        return cls(run.resolve().name, read_curve(run), 1)
-
-
 def draw_curves(runs: Sequence[Path], out: Path) -> None:
     """Draw what the run folders' curves say, one colour a run, over millions of steps, and tabulate every fifth update.
 
@@ -67,8 +48,8 @@ def draw_curves(runs: Sequence[Path], out: Path) -> None:
         raise ConfigError(f"The table beside {out} would replace the run's own {CURVE}; choose another --out.")
     if len(runs) > len(COLOURS):
         raise ConfigError(f"One picture shows {len(COLOURS)} runs at most, not {len(runs)}; draw two.")
-    curves = [Curve.of(run) for run in runs]
-    if len({curve.name for curve in curves}) < len(curves):
+    curves = {run.resolve().name: read_curve(run) for run in runs}
+    if len(curves) < len(runs):
         raise ConfigError("The picture names the runs by their folders; give them different names.")
     figure = blank_figure(SIZE[0] * len(PANELS), SIZE[1] + 24 * ((len(curves) + 3) // 4))
     plots = figure.subplots(1, len(PANELS))
@@ -76,17 +57,15 @@ def draw_curves(runs: Sequence[Path], out: Path) -> None:
         axes.set(ylim=(0.0, maximum), xlabel="steps [millions]")
         axes.set_title(title, fontsize=10)
         axes.grid(color="#dddddd")
-        for curve, colour in zip(curves, COLOURS, strict=False):
-            rows = SMOOTH // curve.thin
-            values = np.convolve(curve.columns[column], np.full(rows, 1.0 / rows), mode="valid")
-            axes.plot(1e-6 * curve.columns["steps"][-len(values) :], values, color=colour)
-    figure.legend(plots[0].get_lines(), [c.name for c in curves], loc="outside lower left", ncols=4, frameon=False)
+        for curve, colour in zip(curves.values(), COLOURS, strict=False):
+            values = np.convolve(curve[column], np.full(SMOOTH, 1.0 / SMOOTH), mode="valid")
+            axes.plot(1e-6 * curve["steps"][-len(values) :], values, color=colour)
+    figure.legend(plots[0].get_lines(), list(curves), loc="outside lower left", ncols=4, frameon=False)
     out.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(out)
     with table.open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(("run", *KEPT))
-        for curve in curves:
-            columns = (curve.columns[name][:: THIN // curve.thin] for name in KEPT)
-            rows = zip(*columns, strict=True)
-            writer.writerows((curve.name, *(f"{value:.5g}" for value in row)) for row in rows)
+        for name, curve in curves.items():
+            rows = zip(*(curve[column][::THIN] for column in KEPT), strict=True)
+            writer.writerows((name, *(f"{value:.5g}" for value in row)) for row in rows)
