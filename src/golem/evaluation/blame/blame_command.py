@@ -14,12 +14,12 @@ import numpy as np
 from tyro.conf import Positional, arg
 
 from golem.errors import ConfigError, unknown_name
-from golem.evaluation.base import RUNGS, rung_class
+from golem.evaluation.base import rung_class
 from golem.evaluation.blame.game import EXACT, Coalition, Points, Strata, coalitions, orders_of, points, shapley
 from golem.evaluation.blame.oracles import ORACLES, NotHere
 from golem.evaluation.harness.ladder import LadderConfig, prepare, read_ladder, run_ladder
-from golem.evaluation.harness.records import Provenance, TrialRecord, read_records
-from golem.evaluation.harness.run_folder import RunFolder
+from golem.evaluation.harness.records import Provenance, TrialRecord
+from golem.evaluation.harness.run_folder import RunFolder, finished_records
 from golem.evaluation.harness.trial_executor import TrialExecutor, make_executor
 from golem.evaluation.harness.trial_runner import Key, Request, Runner
 from golem.evaluation.metrics.statistics import wilson
@@ -248,11 +248,7 @@ def run_blame(config: BlameConfig) -> int:
     verdicts: list[BlameVerdict] = []
     with closing(make_executor(config.executor, config.j)) as executor:
         for run in config.runs:
-            records = read_records(run / "trials.jsonl")
-            if not records:
-                raise ConfigError(f"{run} holds no trials; give the --out folder of a finished golem ladder.")
-            if records[0].rung not in RUNGS:
-                raise unknown_name(f"rung in {run}", records[0].rung, RUNGS)
+            records = finished_records(run)
             trials = Trials(run, records, config, executor)
             names = trials.candidates()
             if not names:

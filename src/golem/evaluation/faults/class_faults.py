@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -29,12 +30,8 @@ LYING = (
 
 
 def class_faults() -> Iterator[Injection]:
-    """Yield every fault of these classes."""
-    yield from _limp()
-    yield from _senders()
-    yield from _lies()
-    yield from _reports()
-    yield from _gate()
+    """Return every fault of these classes."""
+    return chain(_limp(), _senders(), _lies(), _reports(), _gate())
 
 
 def scaled(fields: tuple[str, ...], where: slice, share: Callable[[FaultMoment], float], kd: float | None) -> Edit:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from functools import partial
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -35,11 +36,8 @@ SENDER = (Reason.COMMAND_GAINS, Reason.COMMAND_JOLTS, Reason.COMMAND_BEYOND)
 
 
 def command_faults() -> Iterator[Injection]:
-    """Yield every fault of commands."""
-    yield from _damaged()
-    yield from _gains()
-    yield from _motion()
-    yield from _times()
+    """Return every fault of commands."""
+    return chain(_damaged(), _gains(), _motion(), _times())
 
 
 def _set(field: str, part: slice, value: Any) -> Callable[[FaultMoment, bytes], Frames]:

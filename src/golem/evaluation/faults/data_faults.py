@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
-from itertools import product
+from itertools import chain, product
 from typing import Any
 
 import numpy as np
@@ -25,13 +25,8 @@ LOST = 0.052
 
 
 def data_faults() -> Iterator[Injection]:
-    """Yield every fault of the robot's data."""
-    yield from _frames()
-    yield from _clock()
-    yield from _frozen()
-    yield from _joints()
-    yield from _imu()
-    yield from _motors()
+    """Return every fault of the robot's data."""
+    return chain(_frames(), _clock(), _frozen(), _joints(), _imu(), _motors())
 
 
 def _stop(name: str, reasons: tuple[Reason, ...], within: float = 0.006, **more: Any) -> Injection:

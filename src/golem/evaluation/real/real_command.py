@@ -16,7 +16,8 @@ from tyro.conf import Positional, arg
 
 from golem.errors import ConfigError, shorten, unknown_name
 from golem.evaluation.base import RUNGS, case_name, make_rung
-from golem.evaluation.harness.records import TrialRecord, read_records
+from golem.evaluation.harness.records import TrialRecord
+from golem.evaluation.harness.run_folder import finished_records
 from golem.evaluation.metrics.prediction_powered import prediction_powered
 from golem.evaluation.metrics.published import GGX_F
 from golem.evaluation.metrics.statistics import Interval, wilson
@@ -142,10 +143,7 @@ def run_real(config: RealConfig) -> int:
         return 1
     rows, twins = read_real(config.file), list[TrialRecord]()
     for run in config.runs:
-        found = read_records(run / "trials.jsonl")
-        if not found:
-            raise ConfigError(f"{run} holds no trials; give --runs the folders of finished ladders.")
-        twins += found
+        twins += finished_records(run)
     profiles = sorted({record.profile for record in twins})
     if len(profiles) > 1:
         raise ConfigError(f"The runs are of the profiles {' and '.join(profiles)}; give those of one.")
