@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import secrets
 import time
 import webbrowser
@@ -18,10 +17,10 @@ from numpy.typing import NDArray
 from golem.dashboard.film import Film, shots
 from golem.dashboard.live import LiveView
 from golem.dashboard.status import Timeline
-from golem.errors import ConfigError, MissingExtra, OutputError
+from golem.errors import ConfigError, MissingExtra
 from golem.evaluation.episodes.oracle import Oracle
 from golem.evaluation.report.demo_page import PickRecord, balance_figures, balance_section, demo_page
-from golem.output_file import write_file
+from golem.output_file import make_folder, write_file
 from golem.provenance import command_line, commit, versions
 from golem.robots.mujoco.balance import BalanceRecorder
 from golem.robots.mujoco.config import WORKSHOPS
@@ -276,7 +275,7 @@ def run_demo(config: DemoConfig) -> DemoResult:
     """
     if config.screws < 1:
         raise ConfigError(f"--screws is {config.screws}; give a number from 1 on.")
-    prepare(config.out)
+    make_folder(config.out)
     drawn = secrets.randbelow(1_000_000) if config.layout == "varied" else 0
     seed = drawn if config.seed is None else config.seed
     config = replace(config, seed=seed)
@@ -366,13 +365,3 @@ def _shown(config: DemoConfig, demo: Demo, running: LockstepRunner, view: LiveVi
     except KeyboardInterrupt:
         print()
     return result
-
-
-def prepare(folder: Path) -> None:
-    """Make sure that the folder can be written, before anything long begins."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"Cannot write to --out {folder}: {error.strerror}; choose another.") from error
-    if not os.access(folder, os.W_OK):
-        raise OutputError(f"Cannot write to --out {folder}: Permission denied; choose another.")

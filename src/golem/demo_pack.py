@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from golem.dashboard.film import Film
-from golem.demo import DemoConfig, prepare
+from golem.demo import DemoConfig
 from golem.evaluation.base import TrialSpec, make_rung
 from golem.evaluation.harness.trials import run_trial
 from golem.evaluation.rung_table import RUNGS
 from golem.evaluation.rungs.whole_pack import WholePackOptions
-from golem.output_file import write_file
+from golem.output_file import make_folder, write_file
 from golem.robots.mujoco.balance import BalanceRecorder
 from golem.run import Narrator
 
@@ -66,7 +66,7 @@ def run_pack_demo(config: DemoConfig) -> bool:
         ConfigError: an option is wrong.
         OutputError: the folder cannot be written.
     """
-    prepare(config.out)
+    make_folder(config.out)
     seed = config.seed or 0
     rung, film = make_rung(RUNGS["pack"], asdict(OPTIONS)), PackFilm()
     rung.onlooker = film

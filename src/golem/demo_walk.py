@@ -10,9 +10,9 @@ from pathlib import Path
 
 from golem.dashboard.film import Film
 from golem.dashboard.live import LiveView
-from golem.demo import DemoConfig, prepare
+from golem.demo import DemoConfig
 from golem.evaluation.episodes.oracle import ContactWatch
-from golem.output_file import write_file
+from golem.output_file import make_folder, write_file
 from golem.robots.mujoco.balance import BalanceRecorder
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.run import Narrator, on_air, shown
@@ -43,7 +43,7 @@ def run_walk_demo(config: DemoConfig) -> bool:
         ConfigError: an option is wrong.
         OutputError: the folder cannot be written.
     """
-    prepare(config.out)
+    make_folder(config.out)
     name, seed = STACK if config.stack == DemoConfig.stack else config.stack, config.seed or 0
     running, built = build(load_stack(name, profile=config.profile), seed)
     with closing(built):

@@ -21,7 +21,7 @@ from typing import Any
 from golem.errors import ConfigError, OutputError, unknown_name
 from golem.evaluation.base import RUNGS, TrialOutcome, TrialSpec, case_name
 from golem.evaluation.harness.records import Provenance, TrialRecord, artefacts, read_records, whole_lines
-from golem.output_file import write_file
+from golem.output_file import make_folder, write_file
 from golem.provenance import changes
 
 FACTS = "run.json"
@@ -61,19 +61,13 @@ class RunFolder(AbstractContextManager["RunFolder", None]):
         self._made = not path.exists()
         self._trials = path / "trials.jsonl"
         self._costs = path / "timings.jsonl"
-        try:
-            path.mkdir(parents=True, exist_ok=True)
-            self._lock = os.open(path, os.O_RDONLY)
-        except OSError as error:
-            raise OutputError(f"Cannot write to --out {path}: {error.strerror}; choose another.") from error
+        make_folder(path)
+        self._lock = os.open(path, os.O_RDONLY)
         try:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
             os.close(self._lock)
             raise OutputError(f"Another run is writing to {path}; wait for it or choose another --out.") from error
-        if not os.access(path, os.W_OK | os.X_OK):
-            os.close(self._lock)
-            raise OutputError(f"Cannot write to --out {path}: Permission denied; choose another.")
 
     def __exit__(self, *_: object) -> None:
         """Release the folder, and remove it if it is empty and was made here."""

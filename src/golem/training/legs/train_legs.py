@@ -13,8 +13,9 @@ from typing import Any, Literal
 import numpy as np
 import torch
 
-from golem.errors import ConfigError, OutputError
+from golem.errors import ConfigError
 from golem.native import Records
+from golem.output_file import make_folder
 from golem.provenance import commit
 from golem.training.legs.checkpoint import CHECKPOINT, CURVE, cut_curve, read_checkpoint
 from golem.training.legs.env import KNOWN, PERIOD, SEEN, TASKS, EnvConfig, Task
@@ -101,10 +102,7 @@ def train(config: TrainLegsConfig) -> Path:
     if config.device == "cuda" and not found:
         raise ConfigError("--device cuda is not there; auto takes it where it is, cpu is everywhere.")
     config = replace(config, device="cuda" if found and config.device != "cpu" else "cpu")
-    try:
-        config.out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"Cannot write to --out {config.out}: {error.strerror}; choose another.") from error
+    make_folder(config.out)
     # Sums of several threads differ in their last bits, and threads of a busy machine wait for each other.
     torch.set_num_threads(1)
     torch.manual_seed(config.seed)
