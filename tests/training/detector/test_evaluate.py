@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from golem.training.detector.dataset import CONDITIONS, Dataset
+from golem.training.detector.dataset import CONDITIONS, Labelled
 from golem.training.detector.evaluate import condition_table, evaluate, table
 from golem.training.detector.labels import CLASSES
 from golem.types import Detection
 
 
-def data(*rows: list[float]) -> Dataset:
+def data(*rows: list[float]) -> list[Labelled]:
     """Return one image with these labels."""
-    return Dataset([np.zeros((48, 64, 3), np.uint8)], [np.array(rows)], ["head"], [{}])
+    return [Labelled(np.zeros((48, 64, 3), np.uint8), np.array(rows), "head", {})]
 
 
 def screw(x: float, y: float, ignore: float = 0.0) -> list[float]:
@@ -61,7 +61,7 @@ def test_each_condition_has_a_row_per_value_that_occurs() -> None:
     images = [np.full((48, 64, 3), k, np.uint8) for k in range(3)]
     trays: list[str] = ["red", "teal", "teal"]
     places = [{name: tray if name == "tray" else "same" for name in CONDITIONS} for tray in trays]
-    held = Dataset(images, [np.array([screw(20, 20)])] * 3, ["head"] * 3, places)
+    held = [Labelled(i, np.array([screw(20, 20)]), "head", place) for i, place in zip(images, places, strict=True)]
     rows = condition_table(held, lambda image: [hit(20, 20, 0.9)] if image[0, 0, 0] else []).splitlines()
     assert "| tray | red | 1 | 0.000 | 0.000 | none | none |" in rows
     assert "| tray | teal | 2 | 1.000 | 1.000 | none | none |" in rows and len(rows) == 2 + 5

@@ -55,20 +55,20 @@ def coco(folder: Path, count: int = 5) -> Path:
 
 def test_folders_of_yolo_say_what_is_held_out(tmp_path: Path) -> None:
     data, held, classes = load_own(yolo(tmp_path), 0, 640)
-    assert (len(data.images), len(held.images), classes) == (4, 2, ("orange_cover",))
-    kind, x, y, x0, y0, x1, y1, ignored = data.labels[0][0]
+    assert (len(data), len(held), classes) == (4, 2, ("orange_cover",))
+    kind, x, y, x0, y0, x1, y1, ignored = data[0].labels[0]
     assert (kind, x1 - x0, y1 - y0, ignored) == (0.0, pytest.approx(40, abs=0.1), pytest.approx(40, abs=0.1), 0.0)
-    np.testing.assert_array_equal(data.images[0][round(y), round(x)], (250, 220, 40))
+    np.testing.assert_array_equal(data[0].image[round(y), round(x)], (250, 220, 40))
     corner = round(y0 + 0.5), round(x0 + 0.5)
-    assert tuple(data.images[0][corner]) == (250, 220, 40)
-    assert tuple(data.images[0][corner[0] - 1, corner[1] - 1]) != (250, 220, 40)
+    assert tuple(data[0].image[corner]) == (250, 220, 40)
+    assert tuple(data[0].image[corner[0] - 1, corner[1] - 1]) != (250, 220, 40)
 
 
 def test_of_coco_every_fifth_is_held_out_and_large_images_shrink(tmp_path: Path) -> None:
     data, held, classes = load_own(coco(tmp_path), 0, 160)
-    assert (len(data.images), len(held.images), classes) == (4, 1, ("cap",))
-    assert data.images[0].shape == (120, 160, 3)
-    assert data.labels[0][0, 5] - data.labels[0][0, 3] == pytest.approx(20)
+    assert (len(data), len(held), classes) == (4, 1, ("cap",))
+    assert data[0].image.shape == (120, 160, 3)
+    assert data[0].labels[0, 5] - data[0].labels[0, 3] == pytest.approx(20)
 
 
 def test_one_command_makes_weights_that_the_localizer_takes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -138,6 +138,6 @@ def test_ignored_boxes_are_neither_learnt_nor_held_against_it(tmp_path: Path) ->
     data["annotations"] += [{"category_id": 3, "ignore": 1} | extra, {"category_id": 4, "iscrowd": 1} | extra]
     path.write_text(json.dumps(data))
     train, held, classes = load_own(folder, 0, 640)
-    labels = np.concatenate(train.labels + held.labels)
+    labels = np.concatenate([one.labels for one in (*train, *held)])
     assert classes == ("cap",)
     assert len(labels) == 6 and labels[:, 7].sum() == 1

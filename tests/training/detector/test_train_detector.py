@@ -14,7 +14,7 @@ import pytest
 torch = pytest.importorskip("torch", reason="training needs the extra 'train'")
 
 from golem.capabilities.perception.onnx_detector import OnnxDetector, OnnxDetectorConfig  # noqa: E402
-from golem.training.detector.dataset import Dataset  # noqa: E402
+from golem.training.detector.dataset import Labelled  # noqa: E402
 from golem.training.detector.evaluate import draw_curve  # noqa: E402
 from golem.training.detector.labels import CLASSES  # noqa: E402
 from golem.training.detector.part_net import PartNet, export_onnx  # noqa: E402
@@ -107,10 +107,9 @@ def test_the_curve_of_the_shipped_weights_reaches_their_step() -> None:
 
 @pytest.mark.parametrize("n", [1, 2, 4, 37, 700])
 def test_a_checkpoint_is_chosen_on_images_that_do_not_train(n: int) -> None:
-    images = [np.full((1, 1, 3), k % 256, np.uint8) for k in range(n)]
-    data = Dataset(images, [np.zeros((0, 8))] * n, ["own"] * n, [{}] * n)
+    data = [Labelled(np.full((1, 1, 3), k % 256, np.uint8), np.zeros((0, 8)), "own", {}) for k in range(n)]
     train_on, choice = set_apart(data, 80)
-    assert 1 <= len(choice.images) <= max(1, min(80, n // 10))
-    seen = {id(image) for image in train_on.images}
-    assert n == 1 or not any(id(image) in seen for image in choice.images)
-    assert n == 1 or len(train_on.images) + len(choice.images) == n
+    assert 1 <= len(choice) <= max(1, min(80, n // 10))
+    seen = {id(one.image) for one in train_on}
+    assert n == 1 or not any(id(one.image) in seen for one in choice)
+    assert n == 1 or len(train_on) + len(choice) == n

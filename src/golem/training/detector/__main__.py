@@ -18,7 +18,7 @@ from golem.evaluation.metrics.coco import LabelledImage
 from golem.evaluation.metrics.yolo_labels import read_labelled
 from golem.robots.sensors.streams import stream
 from golem.training.detector import dataset
-from golem.training.detector.dataset import Dataset
+from golem.training.detector.dataset import Labelled
 from golem.training.detector.labels import CLASSES, KITCHEN, MIN_SIDE, PACK
 from golem.training.detector.train_detector import RUNS, TrainDetectorConfig
 from golem.training.detector.train_detector import train as run_training
@@ -32,7 +32,7 @@ the seed. A year after it (val2017) says nothing."""
 SHARE = 0.2
 
 
-def load_own(folder: Path, seed: int, width: int) -> tuple[Dataset, Dataset, tuple[str, ...]]:
+def load_own(folder: Path, seed: int, width: int) -> tuple[list[Labelled], list[Labelled], tuple[str, ...]]:
     """Return the training images, the held-out ones, and the classes in the order of their numbers.
 
     Args:
@@ -54,15 +54,9 @@ def load_own(folder: Path, seed: int, width: int) -> tuple[Dataset, Dataset, tup
         held[stream(seed, "detector/own").permutation(len(images))[: max(count, 1)]] = True
     if held.all():
         raise ConfigError(f"{folder} has {len(images)} images, and all are held out; training needs some, too.")
-    splits = [Dataset([], [], [], []) for _ in range(2)]
-    for image, out in zip(images, held, strict=True):
-        pixels, labels = _scaled(image, classes, width)
-        split = splits[int(out)]
-        split.images.append(pixels)
-        split.labels.append(labels)
-        split.cameras.append(CAMERA)
-        split.conditions.append({})
-    if not any(len(labels) for labels in splits[0].labels):
+    scaled = [Labelled(*_scaled(image, classes, width), CAMERA, {}) for image in images]
+    splits = [[one for one, out in zip(scaled, held, strict=True) if out == apart] for apart in (False, True)]
+    if not any(len(one.labels) for one in splits[0]):
         raise ConfigError(f"All labelled images of {folder} are held out; training needs some, too.")
     return splits[0], splits[1], classes
 
@@ -157,7 +151,7 @@ def evaluate(data: Path = RUNS / "data", weights: Path | None = None) -> None:
     held = dataset.load(data, "held_out")
     found: dict[int, list[Detection]] = {}
     times: dict[str, list[float]] = {"head": [], "palm": []}
-    for image, camera in zip(held.images, held.cameras, strict=True):
+    for image, _, camera, _ in held:
         start = time.process_time()
         found[id(image)] = detector.detect(image)
         times[camera].append(1e3 * (time.process_time() - start))
@@ -166,15 +160,15 @@ def evaluate(data: Path = RUNS / "data", weights: Path | None = None) -> None:
         return found[id(image)]
 
     for world, classes in (("pack", PACK), ("kitchen", KITCHEN)):
-        part = held.of_world(world)
+        part = [one for one in held if one.conditions["world"] == world]
         known = tuple(name for name in classes if name in detector.classes)
         if known:
             print(f"{table(evaluate(part, detect, classes=CLASSES), known)}\n")
         others = [name for name in detector.classes if name not in classes]
         if others:
             per_image = false_alarms(part, detect, others)
-            print(f"{world}: {per_image:.3f} false {', '.join(others)} per image ({len(part.images)} images)\n")
-    print(condition_table(held.of_world("pack"), detect))
+            print(f"{world}: {per_image:.3f} false {', '.join(others)} per image ({len(part)} images)\n")
+    print(condition_table([one for one in held if one.conditions["world"] == "pack"], detect))
     for camera, taken in times.items():
         print(f"{camera}: {np.median(taken):.1f} ms CPU per image (median of {len(taken)}, one thread)")
 
@@ -207,7 +201,7 @@ def own(
     if steps < 1 or width < 64 or seed < 0:
         raise ConfigError("--steps must be 1 or more, --width 64 px or more, --seed 0 or more.")
     data, held, classes = load_own(labels, seed, width)
-    print(f"{len(data.images)} images to train on, {len(held.images)} held out; classes: {', '.join(classes)}")
+    print(f"{len(data)} images to train on, {len(held)} held out; classes: {', '.join(classes)}")
     shipped = resources.files("golem.capabilities.perception").joinpath(SHIPPED)
     with resources.as_file(shipped) as default:
         config = TrainDetectorConfig(

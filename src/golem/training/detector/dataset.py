@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor, as_completed
-from dataclasses import dataclass
+from itertools import chain
 from multiprocessing import get_context
 from pathlib import Path
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -156,35 +157,20 @@ FANCY_SHARE = 0.25
 """Share of the images with shadows and smooth edges."""
 
 
-@dataclass(frozen=True)
-class Dataset:
-    """A split in memory.
+class Labelled(NamedTuple):
+    """One image of a split.
 
     Attributes:
-        images: (height, width, 3) RGB each, decoded: 5 GB for the default training split.
-        labels: per image (n, 8), columns as in `labels.COLUMNS`.
-        cameras: per image `"head"` or `"palm"`.
-        conditions: per image the values of `CONDITIONS`, and the kind of its `world`.
+        image: (height, width, 3) RGB, decoded: 5 GB for the default training split.
+        labels: (n, 8), columns as in `labels.COLUMNS`.
+        camera: `"head"` or `"palm"`.
+        conditions: the values of `CONDITIONS`, and the kind of its `world`.
     """
 
-    images: list[NDArray[np.uint8]]
-    labels: list[Array]
-    cameras: list[str]
-    conditions: list[dict[str, str]]
-
-    def of_world(self, kind: str) -> Dataset:
-        """Return the images of one kind of world."""
-        return self.only(k for k, conditions in enumerate(self.conditions) if conditions["world"] == kind)
-
-    def only(self, chosen: Iterable[int]) -> Dataset:
-        """Return the images with these numbers."""
-        some = Dataset([], [], [], [])
-        for k in chosen:
-            some.images.append(self.images[k])
-            some.labels.append(self.labels[k])
-            some.cameras.append(self.cameras[k])
-            some.conditions.append(self.conditions[k])
-        return some
+    image: NDArray[np.uint8]
+    labels: Array
+    camera: str
+    conditions: dict[str, str]
 
 
 def render(
@@ -262,31 +248,25 @@ def _write(path: Path, seed: int, index: int, split: str, per_camera: int, kind:
     part.rename(path)
 
 
-def load(folder: Path, split: str) -> Dataset:
+def load(folder: Path, split: str) -> list[Labelled]:
     """Read a split. Raises FileNotFoundError: nothing was rendered there."""
     paths = sorted((folder / split).glob("*.npz"))
     if not paths:
         raise FileNotFoundError(f"no rendered worlds in {folder / split}")
-    data = Dataset([], [], [], [])
     with ThreadPoolExecutor() as pool:  # decoding leaves the other threads free
-        for world in pool.map(_read, paths):
-            data.images.extend(world.images)
-            data.labels.extend(world.labels)
-            data.cameras.extend(world.cameras)
-            data.conditions.extend(world.conditions)
-    return data
+        return list(chain.from_iterable(pool.map(_read, paths)))
 
 
-def _read(path: Path) -> Dataset:
-    data = Dataset([], [], [], [])
+def _read(path: Path) -> list[Labelled]:
+    data: list[Labelled] = []
     with np.load(path) as file:
         for key in sorted(k for k in file.files if k.startswith("image_")):
             image = cv2.imdecode(file[key], cv2.IMREAD_COLOR)
             if image is None:
                 raise ValueError(f"{key} in {path} cannot be decoded")
-            data.images.append(np.ascontiguousarray(image[..., ::-1], np.uint8))
-            data.labels.append(file[key.replace("image_", "label_")].reshape(-1, len(COLUMNS)).astype(float))
-            data.cameras.append(key.split("_")[1])
+            rgb = np.ascontiguousarray(image[..., ::-1], np.uint8)
+            labels = file[key.replace("image_", "label_")].reshape(-1, len(COLUMNS)).astype(float)
             words = file[key.replace("image_", "conditions_")].tolist()
-            data.conditions.append({"world": path.stem.split("_")[0], **dict(zip(CONDITIONS, words, strict=True))})
+            conditions = {"world": path.stem.split("_")[0], **dict(zip(CONDITIONS, words, strict=True))}
+            data.append(Labelled(rgb, labels, key.split("_")[1], conditions))
     return data

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from golem.figures import blank_figure
-from golem.training.detector.dataset import CONDITIONS, Dataset
+from golem.training.detector.dataset import CONDITIONS, Labelled
 from golem.training.detector.labels import CLASSES
 from golem.types import Array, Detection
 
@@ -69,7 +69,7 @@ class Score:
 
 
 def evaluate(
-    data: Dataset, detect: Detector, working_score: float = 0.3, classes: Sequence[str] = CLASSES
+    data: Sequence[Labelled], detect: Detector, working_score: float = 0.3, classes: Sequence[str] = CLASSES
 ) -> dict[tuple[str, str], Score]:
     """Return the figures by (camera, class).
 
@@ -81,20 +81,22 @@ def evaluate(
     """
     hits: dict[tuple[str, str], list[tuple[float, bool, float]]] = {}
     counts: dict[tuple[str, str], int] = {}
-    for index, camera in enumerate(data.cameras):
-        found = detect(data.images[index])
+    for image, labels, camera, _ in data:
+        found = detect(image)
         for kind, label in enumerate(classes):
             key = (camera, label)
-            truth = data.labels[index][data.labels[index][:, 0] == kind]
+            truth = labels[labels[:, 0] == kind]
             counts[key] = counts.get(key, 0) + int((truth[:, 7] == 0).sum())
             hits.setdefault(key, []).extend(_match([d for d in found if d.label == label], truth))
     return {key: _score(hits[key], counts[key], working_score) for key in sorted(counts)}
 
 
-def false_alarms(data: Dataset, detect: Detector, classes: Sequence[str], working_score: float = 0.3) -> float:
+def false_alarms(
+    data: Sequence[Labelled], detect: Detector, classes: Sequence[str], working_score: float = 0.3
+) -> float:
     """Return how many detections of `classes` an image has on average where there are no such things."""
-    count = sum(d.label in classes and d.score >= working_score for image in data.images for d in detect(image))
-    return count / max(len(data.images), 1)
+    count = sum(d.label in classes and d.score >= working_score for one in data for d in detect(one.image))
+    return count / max(len(data), 1)
 
 
 def _match(found: list[Detection], truth: Array) -> list[tuple[float, bool, float]]:
@@ -140,14 +142,14 @@ def _score(hits: list[tuple[float, bool, float]], count: int, working_score: flo
     )
 
 
-def condition_table(data: Dataset, detect: Detector) -> str:
+def condition_table(data: Sequence[Labelled], detect: Detector) -> str:
     """Return the mean AP of classes and cameras, and that of `BY_CONDITION`, for each value of each condition."""
     columns = " | ".join(f"{label}, {camera}" for camera, label in BY_CONDITION)
     lines = [f"| condition | value | images | mean AP | {columns} |", "|---" * (4 + len(BY_CONDITION)) + "|"]
     for name in CONDITIONS:
-        for value in sorted({conditions[name] for conditions in data.conditions}):
-            chosen = [k for k, conditions in enumerate(data.conditions) if conditions[name] == value]
-            scores = evaluate(data.only(chosen), detect)
+        for value in sorted({one.conditions[name] for one in data}):
+            chosen = [one for one in data if one.conditions[name] == value]
+            scores = evaluate(chosen, detect)
             found = {key: s.ap for key, s in scores.items() if s.count}
             mean = f"{np.mean(list(found.values())):.3f}"
             single = " | ".join(f"{found[key]:.3f}" if key in found else "none" for key in BY_CONDITION)

@@ -21,8 +21,9 @@ from torch.nn import functional
 from golem.capabilities.perception.peaks import STRIDE, find_peaks, normalise
 from golem.errors import ConfigError
 from golem.robots.sensors.streams import stream
-from golem.training.detector import augment, dataset
+from golem.training.detector import augment
 from golem.training.detector.augment import CROP, MEAN, STD
+from golem.training.detector.dataset import Labelled, load
 from golem.training.detector.evaluate import THRESHOLD, Detector, evaluate
 from golem.training.detector.labels import CLASSES
 from golem.training.detector.part_net import MULTIPLE, PartNet
@@ -182,9 +183,9 @@ class TrainDetectorConfig:
 class Crops:
     """Random crops of a data set, and what the network should say of them, made on the device that trains."""
 
-    def __init__(self, data: dataset.Dataset, classes: int, device: str) -> None:
-        self._labels, self._classes, self._device = data.labels, classes, device
-        self._images = augment.Images(data.images, device)
+    def __init__(self, data: Sequence[Labelled], classes: int, device: str) -> None:
+        self._labels, self._classes, self._device = [one.labels for one in data], classes, device
+        self._images = augment.Images([one.image for one in data], device)
 
     def batch(self, rng: np.random.Generator, size: int) -> tuple[Tensor, Tensor, Tensor, Tensor]:
         """Return images, heatmaps, their weights, and regression maps of `size` crops; see `heat_targets.targets`."""
@@ -241,30 +242,30 @@ def train(config: TrainDetectorConfig, stop: int | None = None) -> Path:
     Returns:
         The path of the best checkpoint by mean AP on what was set apart. The held-out split has no part in it.
     """
-    return fit(config, dataset.load(config.data, "train"), stop)
+    return fit(config, load(config.data, "train"), stop)
 
 
 RUN = 32
 """Images of one world, which are set apart together: pictures of one place are no test for each other."""
 
 
-def set_apart(data: dataset.Dataset, most: int) -> tuple[dataset.Dataset, dataset.Dataset]:
+def set_apart(data: Sequence[Labelled], most: int) -> tuple[list[Labelled], list[Labelled]]:
     """Return the images to train on, and a tenth, at most `most`, in runs of neighbours; of one image it is that."""
-    n = len(data.images)
+    n = len(data)
     run = max(1, min(RUN, n // 10))
     runs = np.linspace(0, (n - 1) // run, max(1, min(most, n // 10) // run)).astype(int)
     chosen = {run * int(k) + i for k in runs for i in range(run) if run * int(k) + i < n}
-    rest = [k for k in range(n) if k not in chosen]
-    return data.only(rest or [0]), data.only(sorted(chosen))
+    rest = [one for k, one in enumerate(data) if k not in chosen]
+    return rest or [data[0]], [data[k] for k in sorted(chosen)]
 
 
-def fit(config: TrainDetectorConfig, data: dataset.Dataset, stop: int | None = None) -> Path:
+def fit(config: TrainDetectorConfig, data: Sequence[Labelled], stop: int | None = None) -> Path:
     """Train or resume on images in memory; see `train`. Raises ConfigError: a run of other classes is there."""
     torch.set_num_threads(1)
     torch.manual_seed(config.seed)
     config.out.mkdir(parents=True, exist_ok=True)
     data, choice = set_apart(data, config.check_images)
-    keys = [(camera, label) for camera in sorted(set(choice.cameras)) for label in config.classes]
+    keys = [(camera, label) for camera in sorted({one.camera for one in choice}) for label in config.classes]
     model = PartNet(len(config.classes))
     if config.start is not None:
         load_onnx(model, config.start, config.classes)
