@@ -12,7 +12,7 @@ import numpy as np
 from golem.capabilities.mapping.base import Mapper
 from golem.capabilities.mapping.map_file import StoredMap
 from golem.evaluation.conformance.base import Candidate, check
-from golem.evaluation.conformance.room import HEIGHT, ROOM, MadeWalk
+from golem.evaluation.conformance.room import ROOM, MadeWalk
 from golem.evaluation.conformance.samples import with_nan
 from golem.evaluation.conformance.suite import Suite
 from golem.interfaces.nav_payloads import OccupancyGrid, Scan
@@ -135,14 +135,7 @@ class MapperSuite(Suite):
 
 @lru_cache(maxsize=1)
 def _scans() -> tuple[Scan, ...]:
-    walk, rng = MadeWalk(ROOM, still=100.0, every=4), np.random.default_rng(2)
-    T = walk.T_base_lidar
-    found: list[Scan] = []
-    for i in range(1, SCANS + 1):
-        scan = walk.scan(TENTH * i, rng)
-        points = scan.points.astype(np.float64) @ T[:3, :3].T + T[:3, 3]
-        found.append(Scan(scan.t, points, T[:3, 3].copy(), np.array([0.0, 0.0, -HEIGHT])))
-    return tuple(found)
+    return tuple(MadeWalk(ROOM, still=100.0, every=4).base_scans(SCANS, np.random.default_rng(2)))
 
 
 def _near(grid: OccupancyGrid, x: float, y: float, around: float) -> int:

@@ -9,6 +9,7 @@ import numpy as np
 
 from golem.capabilities.odometry.base import lidar_in_base
 from golem.interfaces.lidar import ExternalOdometry, LegOdometry, LidarImu, LidarScan
+from golem.interfaces.nav_payloads import Scan
 from golem.robots.model.spatial import transform
 from golem.robots.sensors.mid360 import IMU_PERIOD, P_LIDAR_IMU, POINT_RATE, SCAN, directions
 from golem.types import Array
@@ -69,6 +70,17 @@ class MadeWalk:
         seen = distance < 40.0
         points = (rays[seen] * distance[seen, None]).astype(np.float32)
         return LidarScan(t, points, offsets[seen].astype(np.float32), SCAN)
+
+    def base_scans(self, count: int, rng: np.random.Generator) -> list[Scan]:
+        """Return the scans of the first `count` tenths of a second, in base_link."""
+        T, floor = self.T_base_lidar, np.array([0.0, 0.0, -HEIGHT])
+        found: list[Scan] = []
+        for i in range(1, count + 1):
+            with np.errstate(invalid="ignore"):  # a ray along a wall
+                scan = self.scan(SCAN * i, rng)
+            points = scan.points[np.isfinite(scan.points).all(axis=1)].astype(np.float64)
+            found.append(Scan(scan.t, points @ T[:3, :3].T + T[:3, 3], T[:3, 3].copy(), floor))
+        return found
 
     def tenths(self, seconds: float) -> Iterator[list[Reading]]:
         """Yield what is said in each tenth of a second, in the order of arrival."""

@@ -11,8 +11,8 @@ from golem.capabilities.navigation.astar import Way, astar
 from golem.capabilities.navigation.costmap import INSCRIBED, Costmap
 from golem.capabilities.navigation.footprint import HOME
 from golem.capabilities.navigation.local_controller import Around, LocalController, LocalControllerConfig
-from golem.evaluation.conformance.room import HEIGHT, ROOM, MadeWalk
-from golem.interfaces.nav_payloads import OccupancyGrid, Scan
+from golem.evaluation.conformance.room import ROOM, MadeWalk
+from golem.interfaces.nav_payloads import OccupancyGrid
 from golem.types import Array, PlanarPose
 
 SIDE, BOXES = 400, 60
@@ -28,7 +28,8 @@ def navigation_times(timed: Timed, n: int) -> list[tuple[str, Array, str]]:
         cells[r : r + 20, c : c + 20] = 100
     grid = OccupancyGrid(0.0, PlanarPose(0.0, 0.0, 0.0), 0.05, cells)
     costmap = Costmap(grid, np.zeros((0, 2)), 0.3)
-    scans, mapper = _scans(n + 3), VoxelGridMapper()
+    walk, mapper = MadeWalk(ROOM, still=1e3, every=1), VoxelGridMapper()
+    scans = walk.base_scans(n + 3, np.random.default_rng(1))
     for scan in scans[:3]:
         mapper.add_scan(scan)
     mapper.grid()
@@ -50,14 +51,3 @@ def navigation_times(timed: Timed, n: int) -> list[tuple[str, Array, str]]:
         ("A* over 400 x 400, corner to corner", timed(search, n), "20 ms (issue 28)"),
         ("local controller: one twist", timed(follow, n), "50 ms: 20 Hz"),
     ]
-
-
-def _scans(count: int) -> list[Scan]:
-    walk, rng, found = MadeWalk(ROOM, still=1e3, every=1), np.random.default_rng(1), list[Scan]()
-    T, floor = walk.T_base_lidar, np.array([0.0, 0.0, -HEIGHT])
-    for i in range(1, count + 1):
-        with np.errstate(invalid="ignore"):  # a ray along a wall
-            scan = walk.scan(0.1 * i, rng)
-        points = scan.points[np.isfinite(scan.points).all(axis=1)].astype(np.float64)
-        found.append(Scan(scan.t, points @ T[:3, :3].T + T[:3, 3], T[:3, 3].copy(), floor))
-    return found
