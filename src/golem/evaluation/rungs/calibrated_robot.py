@@ -16,7 +16,7 @@ from golem.errors import ConfigError
 from golem.evaluation.base import DONE, Rung, TrialOutcome, TrialSpec
 from golem.evaluation.blame.oracles import with_modules
 from golem.evaluation.episodes.episode import episode_seed
-from golem.evaluation.rungs.pick_screw import SLOT, PickOptions, PickRung
+from golem.evaluation.rungs.pick_screw import PickOptions, PickRung
 from golem.output_file import write_file
 from golem.provenance import stack_facts
 from golem.robots.mujoco.engine import MujocoRobot
@@ -191,6 +191,7 @@ class CalibratedTether(PickRung):
     """Rung `tether` with a robot that was calibrated first: the same screws and errors, and a calibration's file."""
 
     name = "tether-calibrated"
+    stack_name = STACK
     Options = CalibratedPickOptions
 
     def __init__(self, options: CalibratedPickOptions | None = None) -> None:
@@ -213,10 +214,7 @@ class CalibratedTether(PickRung):
                 self._file = None
 
     def _stack(self, method: str, profile: str, overrides: Mapping[str, str]) -> Stack:
-        if SLOT in overrides:
-            raise ConfigError(f"The method is what sits in {SLOT}; leave out --use {SLOT}=...")
-        stack = load_stack(STACK, profile=profile).with_choice(SLOT, method)
-        stack = with_modules(stack, overrides)
+        stack = super()._stack(method, profile, overrides)
         return stack if self._file is None else stack.with_part("calibration", file=str(self._file))
 
 

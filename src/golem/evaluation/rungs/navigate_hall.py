@@ -125,6 +125,15 @@ class NavigateOptions:
     """The odometry by which the map is made."""
 
 
+def surveyed(stack: Stack, spec: TrialSpec, folder: Path) -> Stack:
+    """Return a stack whose mapper has the map of a trial's hall from before, kept in `folder`, and a rough guess."""
+    seed = episode_seed(spec.seed, spec.index)
+    with closing(build_robot(stack, seed)) as robot:
+        survey(robot, seed, folder / "hall")
+    guess = (spec.rng("guess").uniform(-1.0, 1.0, 3) * GUESS).tolist()
+    return stack.with_options("mapper", file=f"{folder}/hall.yaml", guess=guess)
+
+
 class NavigateRung(Rung[NavigateOptions]):
     """Walk 6 m from a noisy start through a hall whose walls and obstacles are drawn by the seed, and stand at a pose.
 
@@ -149,11 +158,7 @@ class NavigateRung(Rung[NavigateOptions]):
         seed, known = episode_seed(spec.seed, spec.index), spec.case["map"] == "survey"
         with TemporaryDirectory() as folder:
             if known:
-                robot = build_robot(stack, seed)
-                survey(robot, seed, Path(folder) / "hall")
-                robot.close()
-                guess = (spec.rng("guess").uniform(-1.0, 1.0, 3) * GUESS).tolist()
-                stack = stack.with_options("mapper", file=f"{folder}/hall.yaml", guess=guess)
+                stack = surveyed(stack, spec, Path(folder))
             with closing(Episode(stack, seed, self.onlooker)) as episode:
                 return self._walk(spec, episode, known)
 

@@ -11,7 +11,7 @@ from contextlib import closing
 from dataclasses import asdict, dataclass, replace
 from functools import cache, lru_cache
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -251,6 +251,8 @@ class PickRung(Rung[PickOptions]):
     Options = PickOptions
     default_methods = ("centroid", "visual_servo")
     slot = SLOT
+    stack_name: ClassVar[str] = ""
+    """The shipped stack that it runs; empty for the one of its own name."""
 
     def __init__(self, options: PickOptions | None = None) -> None:
         super().__init__(options)
@@ -327,7 +329,7 @@ class PickRung(Rung[PickOptions]):
     def _stack(self, method: str, profile: str, overrides: Mapping[str, str]) -> Stack:
         if SLOT in overrides:
             raise ConfigError(f"The method is what sits in {SLOT}; leave out --use {SLOT}=...")
-        stack = load_stack(self.name, profile=profile).with_choice(SLOT, method)
+        stack = load_stack(self.stack_name or self.name, profile=profile).with_choice(SLOT, method)
         stack = with_modules(stack, overrides)
         if stack.on_ground != self.balances:
             raise ConfigError(

@@ -21,14 +21,12 @@ from golem.evaluation.episodes.episode import Episode, Loss, episode_seed, lost
 from golem.evaluation.episodes.oracle import ContactWatch, Oracle, place_error
 from golem.evaluation.episodes.pick_claims import claims
 from golem.evaluation.episodes.pick_watch import PickTouches, PickWatch
-from golem.evaluation.episodes.survey import survey
-from golem.evaluation.rungs.navigate_hall import DISTANCE, GUESS, SPREAD
+from golem.evaluation.rungs.navigate_hall import DISTANCE, SPREAD, surveyed
 from golem.evaluation.rungs.pick_screw import SETTLE, PickOptions, PickRung, balance, judge_pick
 from golem.interfaces import topics
 from golem.middleware.bus import News
 from golem.robots.mujoco.balance import TRACE, BalanceRecorder
 from golem.robots.worlds.conditions import LayoutKind
-from golem.runtime.lockstep import build_robot
 from golem.skills.base import SkillResult
 from golem.skills.context import Context
 from golem.skills.disassemble_goal import DisassembleGoal, DisassembleReport
@@ -118,10 +116,7 @@ class VarStandRung(PickRung):
         )
         with TemporaryDirectory() as folder:
             if walks:
-                with closing(build_robot(stack, seed)) as robot:
-                    survey(robot, seed, Path(folder) / "hall")
-                guess = (spec.rng("guess").uniform(-1.0, 1.0, 3) * GUESS).tolist()
-                stack = stack.with_options("mapper", file=f"{folder}/hall.yaml", guess=guess)
+                stack = surveyed(stack, spec, Path(folder))
             with closing(Episode(stack, seed, self.onlooker)) as episode:
                 trial = _Trial(spec, stack, episode, stance, self.options.label)
                 outcome = trial.run()
