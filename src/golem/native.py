@@ -160,40 +160,29 @@ def new_shared() -> Records:
 
 def view(dtype: np.dtype[Any]) -> Any:
     """Return a function of compiled code that takes the address of a record of `dtype` and returns the record."""
-    kind = from_dtype(dtype)
+    return _at(from_dtype(dtype))
 
+
+def _at(kind: Any) -> Any:
     @intrinsic
-    def record_at(typingctx: Any, place: Any) -> Any:
+    def there(typingctx: Any, place: Any) -> Any:
         def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
             return builder.inttoptr(args[0], context.get_value_type(kind))
 
         return kind(types.int64), code
 
-    return record_at
+    return there
 
 
 shared = view(RECORD)
 """In compiled code: the shared record at an address."""
 
 
-def _pointer(number: Any) -> Any:
-    kind = types.CPointer(number)
-
-    @intrinsic
-    def numbers(typingctx: Any, place: Any) -> Any:
-        def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-            return builder.inttoptr(args[0], context.get_value_type(kind))
-
-        return kind(types.int64), code
-
-    return numbers
-
-
-floats = _pointer(types.float64)
+floats = _at(types.CPointer(types.float64))
 """In compiled code: the float64 numbers at an address, to be indexed without any check."""
-ints = _pointer(types.int64)
+ints = _at(types.CPointer(types.int64))
 """The same for int64."""
-words = _pointer(types.int32)
+words = _at(types.CPointer(types.int32))
 """The same for int32."""
 
 
