@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import cv2
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
@@ -68,7 +69,7 @@ class RandomKitchen(RandomScene):
     def randomise_objects(self, rng: np.random.Generator) -> None:
         """Move the things about the counter, lay some on their side, open the fridge, scatter distractors."""
         model, data, layout = self.model, self.data, self.layout
-        random_scene.reset(self.world)
+        mujoco.mj_resetData(model, data)
         if rng.random() < 0.3:
             data.qpos[model.joint(HINGE).qposadr[0]] = rng.uniform(0.0, 1.2)
         sides = [thing.position[1] for thing in layout.things]
@@ -102,7 +103,7 @@ class RandomKitchen(RandomScene):
         handle = next(part for part in self.parts if part.label == "handle")
         place = handle.position if rng.random() < 0.3 else self._random_place(rng)
         at = np.array([rng.uniform(-0.35, 0.1), place[1] + rng.uniform(-0.4, 0.4), rng.uniform(0.95, 1.15)])
-        random_scene.stand(self.world, at, (0.2, 0.08, 0.05), rng)
+        random_scene.stand(self.world, at, rng)
         return CAMERAS["head"]
 
     def place_palm(self, rng: np.random.Generator) -> CameraInfo:

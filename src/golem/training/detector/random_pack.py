@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -35,7 +36,7 @@ class RandomPack(RandomScene):
         bores = tuple(Bore(mouth, draw.bore_radius, draw.name) for draw, mouth in pairs)
         tops = {draw.name: draw.head_height for draw in draws}
         super().__init__(world, names.parts, bores, tops)
-        self.layout, self.tray, self.draws = layout, "tray", draws
+        self.layout, self.draws = layout, draws
 
     def randomise_looks(self, rng: np.random.Generator) -> Conditions:
         """Draw finishes, colours of materials, robot and distractors, and the lights; see `RandomScene`."""
@@ -66,8 +67,8 @@ class RandomPack(RandomScene):
     def randomise_objects(self, rng: np.random.Generator) -> None:
         """Move the tray, scatter distractors, take some screws out of their bores (tray, cover, or just raised)."""
         model, data, layout = self.model, self.data, self.layout
-        random_scene.reset(self.world)
-        tray = model.body(self.tray).id
+        mujoco.mj_resetData(model, data)
+        tray = model.body("tray").id
         side = rng.choice([-1.0, 1.0])
         tray_at = np.array([layout.near_edge + rng.uniform(-0.02, 0.5), side * rng.uniform(0.15, 0.65), layout.tray_z])
         model.body_pos[tray] = tray_at
@@ -95,7 +96,7 @@ class RandomPack(RandomScene):
     def place_head(self, rng: np.random.Generator) -> CameraInfo:
         """Stand the robot in front of the pack with its head camera looking down at it; returns the camera."""
         at = np.array([rng.uniform(-0.2, 0.15), rng.uniform(-0.4, 0.4), rng.uniform(0.9, 1.15)])
-        random_scene.stand(self.world, at, (0.2, 0.08, 0.05), rng)
+        random_scene.stand(self.world, at, rng)
         return CAMERAS["head"]
 
     def place_palm(self, rng: np.random.Generator) -> CameraInfo:

@@ -227,11 +227,12 @@ def pose_arms(world: Compiled, rng: np.random.Generator) -> None:
         set_gap(world, side, float(rng.uniform(0.0, magpie_model.MAX_GAP)))
 
 
-def stand(world: Compiled, position: Array, sway: tuple[float, float, float], rng: np.random.Generator) -> None:
-    """Put the base at `position` (3,) [m], turned by normal errors about z, y and x of these sizes [rad]."""
+def stand(world: Compiled, position: Array, rng: np.random.Generator) -> None:
+    """Put the base at `position` (3,) [m], turned by normal errors, about z more than about y and x."""
     data = world.data
     data.qpos[:3] = position
-    data.qpos[3:7] = Rotation.from_euler("ZYX", [rng.normal(0.0, size) for size in sway]).as_quat(scalar_first=True)
+    errors = [rng.normal(0.0, size) for size in (0.2, 0.08, 0.05)]
+    data.qpos[3:7] = Rotation.from_euler("ZYX", errors).as_quat(scalar_first=True)
     refresh(world)
 
 
@@ -271,11 +272,6 @@ def set_gap(world: Compiled, side: Side, gap: float) -> None:
         names = magpie_model.finger_names(side, finger)
         world.data.qpos[world.model.joint(names[0]).qposadr[0]] = crank
         world.data.qpos[world.model.joint(names[1]).qposadr[0]] = -crank
-
-
-def reset(world: Compiled) -> None:
-    """Return to the joint positions of the start."""
-    mujoco.mj_resetData(world.model, world.data)
 
 
 def random_part(parts: tuple[PackPart, ...], rng: np.random.Generator) -> PackPart:
