@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
-from typing import Literal, Protocol, TypeVar
+from typing import Literal, TypeVar
 
 from golem.errors import ConfigError, ModuleFault, unknown_name
 from golem.evaluation.base import Rung, TrialOutcome, TrialSpec
@@ -20,8 +20,7 @@ from golem.evaluation.episodes.plain_episode import PlainEpisode
 from golem.evaluation.episodes.scripted_motion import ArmMotion, ScriptedMotion
 from golem.evaluation.harness.copies import CAN_COPY, in_a_copy
 from golem.evaluation.rungs.leg_rung import LegRung, PlantOptions, can_walk, judged, no_walker
-from golem.robots.mujoco.balance import BalanceRecorder
-from golem.robots.mujoco.shoves import DIRECTIONS, Push, rod, shove
+from golem.robots.mujoco.shoves import DIRECTIONS, rod, shove
 from golem.skills.base import FAULT
 from golem.types import Twist
 
@@ -40,26 +39,7 @@ NO_STEP = Loss("no step", "It never lifted that foot for long enough.")
 """A robot that walks without a step."""
 
 
-class PushedEpisode(Protocol):
-    """What both kinds of episode have in common."""
-
-    recorder: BalanceRecorder
-
-    @property
-    def t(self) -> float:
-        """Robot time [s]."""
-        ...
-
-    @property
-    def loss(self) -> Loss | None:
-        """How the robot was lost; None while it was not."""
-        ...
-
-    def run(self, seconds: float, until: Callable[[], bool] = ...) -> None:
-        """Let up to `seconds` of robot time pass."""
-
-    def push(self, push: Push) -> None:
-        """Begin a push now."""
+PushedEpisode = Episode | PlainEpisode
 
 
 @dataclass(frozen=True, slots=True)
