@@ -65,6 +65,7 @@ class LiveView(AbstractContextManager["LiveView", None]):
 
     Attributes:
         period: as of a node that looks on, see `golem.runtime.executor.Node`.
+        panel: with the operator's buttons.
         decide: called when the operator has allowed or denied what the panel asks.
     """
 
@@ -99,7 +100,7 @@ class LiveView(AbstractContextManager["LiveView", None]):
         first = "pick" if robot.scene.names.screws else "walk"
         self._skills = running.skills
         self._view = SpectatorView(robot)
-        self._panel = Panel(
+        self.panel = Panel(
             self._server, self._view.from_odom, self._skills.specs, first, standing=standing, restarts=restarts
         )
         self._stage = Stage(self._server, self._view, standing=standing)
@@ -113,7 +114,7 @@ class LiveView(AbstractContextManager["LiveView", None]):
         self._watch(running, robot)
         if passive:
             self._busy = True
-            self._panel.skill.hide()
+            self.panel.skill.hide()
             print(f"Live view: {self.url}   (Ctrl-C ends it)", flush=True)
             end = time.monotonic() + ARRIVAL
             while not self._server.get_clients() and time.monotonic() < end:
@@ -145,11 +146,6 @@ class LiveView(AbstractContextManager["LiveView", None]):
         self._history = History()
         self._speed, self._start = 1.0, (time.perf_counter(), running.executor.t)
         self._pace: tuple[float, float] = (time.perf_counter(), running.executor.t)
-
-    @property
-    def panel(self) -> Panel:
-        """The panel with the operator's buttons."""
-        return self._panel
 
     @property
     def shown(self) -> tuple[viser.ViserServer, SpectatorView]:
@@ -215,7 +211,7 @@ class LiveView(AbstractContextManager["LiveView", None]):
 
     def _wait(self, t: float) -> None:
         """Let wall time pass until it is as late as robot time at the speed that is asked for."""
-        now, speed = time.perf_counter(), self._panel.view.speed
+        now, speed = time.perf_counter(), self.panel.view.speed
         if speed != self._speed:
             self._speed, self._start = speed, (now, t)
         ahead = self._start[0] + (t - self._start[1]) / speed - now
@@ -238,7 +234,7 @@ class LiveView(AbstractContextManager["LiveView", None]):
             return
         if self._recorder.fallen and not self._note:
             self._note = "The robot fell, by the simulator's truth."
-        status, shown = read_status(self._running), self._panel.view
+        status, shown = read_status(self._running), self.panel.view
         moment = self._history.before(shown.age)
         assert moment is not None
         target, poses = self._timeline.target if self._busy else None, (moment.positions, moment.orientations)
@@ -247,7 +243,7 @@ class LiveView(AbstractContextManager["LiveView", None]):
             self._show_push(t)
         self._shown = t
         stages, pressed = self._timeline.durations(t if self._busy else self._ended), self._running.estop.pressed
-        self._panel.show_status(
+        self.panel.show_status(
             status, stages, self._factor, self._note, pressed=pressed, paused=self._paused, busy=self._busy
         )
         if now >= self._next_camera:
@@ -255,27 +251,27 @@ class LiveView(AbstractContextManager["LiveView", None]):
             self._show_pictures()
 
     def _show_pictures(self) -> None:
-        bus, view = self._running.bus, self._panel.view
+        bus, view = self._running.bus, self.panel.view
         self._stage.show_layers(view.layers, clouds(bus) if "clouds" in view.layers else ())
         state = bus.latest(topics.LOW_STATE)
         view.plot(self._history)
         if state is not None:
-            self._panel.arms.show(state.q[UPPER], {side: self._running.commanded(side) for side in SIDES})
-        if self._panel.legs is not None:
+            self.panel.arms.show(state.q[UPPER], {side: self._running.commanded(side) for side in SIDES})
+        if self.panel.legs is not None:
             chart = balance_chart(self._recorder.trace(), CHART)
             if chart is not None:
-                self._panel.show_picture("balance", chart)
+                self.panel.show_picture("balance", chart)
         floor = map_view(self._running.bus)
         if floor is not None:
-            self._panel.show_picture("map", floor)
+            self.panel.show_picture("map", floor)
         pack = bus.latest(topics.PACK_PLAN)
         if pack is not None:
-            self._panel.show_picture("pack", pack.rgb)
+            self.panel.show_picture("pack", pack.rgb)
         for camera, label in CAMERAS.items():
             picture = camera_picture(self._running, self._view, camera)
             height = round(CAMERA_WIDTH * picture.shape[0] / picture.shape[1])
             picture = cv2.resize(picture, (CAMERA_WIDTH, height), interpolation=cv2.INTER_LINEAR)
-            self._panel.show_picture(label, np.asarray(picture, dtype=np.uint8))
+            self.panel.show_picture(label, np.asarray(picture, dtype=np.uint8))
 
     def _show_push(self, t: float) -> None:
         """Show the push of whoever pushes, its arrow for `SHOWN` at least."""
@@ -289,7 +285,7 @@ class LiveView(AbstractContextManager["LiveView", None]):
 
     def _drive(self, t: float) -> None:
         """Say what the sliders say, as long as somebody holds them: else they go back to zero, and the robot stands."""
-        legs, gate = self._panel.legs, self._running.safety
+        legs, gate = self.panel.legs, self._running.safety
         if legs is None:
             return
         legs.limit(self._running.envelope)
@@ -301,7 +297,7 @@ class LiveView(AbstractContextManager["LiveView", None]):
 
     def _serve_buttons(self) -> None:
         """Do what was asked for. The safety gate has the last word on all that moves the robot."""
-        for button in self._panel.pressed():
+        for button in self.panel.pressed():
             self._note = ""
             if button is Button.PRESS:
                 self._running.estop.press()
@@ -318,20 +314,20 @@ class LiveView(AbstractContextManager["LiveView", None]):
             elif button is Button.MOVE:
                 self._move()
             elif button is Button.RECORD:
-                self._panel.view.recording(self._film.toggle(self._robot, self._recorder))
+                self.panel.view.recording(self._film.toggle(self._robot, self._recorder))
             elif button is Button.RESTART:
                 self._restart = not self._busy
-            elif button is Button.STAND and self._panel.legs is not None:
-                self._panel.legs.twist = Twist()
-            elif button is Button.PUSH and self._panel.legs is not None:
-                self._pusher.begin(self._panel.legs.push, self._running.executor.t, self._recorder.yaw)
+            elif button is Button.STAND and self.panel.legs is not None:
+                self.panel.legs.twist = Twist()
+            elif button is Button.PUSH and self.panel.legs is not None:
+                self._pusher.begin(self.panel.legs.push, self._running.executor.t, self._recorder.yaw)
             else:
                 self._paused = not self._paused
         self._revive()
 
     def _ask(self) -> None:
         """Take up the skill and the goal that the panel shows, unless a skill runs or they make no sense."""
-        name, fields = self._panel.skill.chosen
+        name, fields = self.panel.skill.chosen
         try:
             self._wanted = None if self._running.busy else (name, self._skills.goal(name, fields))
         except GolemError as error:
@@ -339,7 +335,7 @@ class LiveView(AbstractContextManager["LiveView", None]):
 
     def _move(self) -> None:
         """Take up what sliders or gizmos of the arms say."""
-        arms = self._panel.arms
+        arms = self.panel.arms
         self._note = "" if arms.chosen else "Turn a slider or drag a gizmo first."
         if arms.chosen and not self._running.busy:
             self._wanted = arms.chosen, None

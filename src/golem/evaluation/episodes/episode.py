@@ -42,23 +42,18 @@ ODOMETRY_LATENCY = 0.05
 
 
 class SimulatedOdometry:
-    """Publishes `topics.ODOMETRY` for a twin; call it after every tick."""
+    """Publishes `topics.ODOMETRY` for a twin; call it after every tick, or when the next pose is `due` [s]."""
 
     def __init__(self, bus: Bus, rng: np.random.Generator) -> None:
         """Tell `bus` where the base estimator has the robot, with independent noise of every pose drawn from `rng`."""
         self._bus, self._rng = bus, rng
-        self._next = 0.0
-
-    @property
-    def due(self) -> float:
-        """When the next pose is due [s]."""
-        return self._next
+        self.due = 0.0
 
     def __call__(self, t: float) -> None:
         """Publish a pose, if one is due at time `t` [s]."""
-        if t < self._next - 1e-9:
+        if t < self.due - 1e-9:
             return
-        self._next = t + PERIOD
+        self.due = t + PERIOD
         dx, dy = self._rng.normal(0.0, POSITION_NOISE, 2)
         turn = self._rng.normal(0.0, YAW_NOISE)
         base = self._bus.latest(topics.BASE)
