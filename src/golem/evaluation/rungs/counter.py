@@ -20,10 +20,9 @@ from golem.evaluation.base import Case, Results, TrialSpec
 from golem.evaluation.episodes.counter_watch import CounterWatch
 from golem.evaluation.episodes.episode import episode_seed
 from golem.evaluation.episodes.oracle import Oracle, place_error
-from golem.evaluation.rungs.kitchen_rung import Errand, KitchenRung, Verdict
+from golem.evaluation.rungs.kitchen_rung import Errand, KitchenOptions, KitchenRung, Verdict
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.mujoco.scene import lay_kitchen
-from golem.robots.worlds.conditions import LayoutKind
 from golem.robots.worlds.kitchen import KitchenLayout, StandingThing
 from golem.robots.worlds.tableware import KINDS
 from golem.runtime.lockstep import LockstepRunner
@@ -50,11 +49,9 @@ ACROSS = 0.06
 
 
 @dataclass(frozen=True)
-class CounterOptions:
+class CounterOptions(KitchenOptions):
     """The counter and what is asked."""
 
-    layout: LayoutKind = "varied"
-    """nominal: the counter always has one height and one colour. varied: drawn from the trial's seed."""
     approach: Literal["top", "forward", "either"] = "either"
     """How the hand is to come."""
     thing: tuple[str, ...] = ()
@@ -196,11 +193,9 @@ LOOK = RememberGoal(tuple(KINDS), 2.0)
 
 
 @dataclass(frozen=True)
-class FetchOptions:
+class FetchOptions(KitchenOptions):
     """The kitchen."""
 
-    layout: LayoutKind = "varied"
-    """nominal: the counter always has one height and one colour. varied: drawn from the trial's seed."""
     moved: tuple[str, ...] = ("no", "yes")
     """no: the thing stays where it was seen. yes: somebody puts it elsewhere on the counter before the errand."""
 

@@ -25,7 +25,7 @@ from golem.evaluation.episodes.episode import episode_seed
 from golem.evaluation.episodes.oracle import Oracle, whereabouts
 from golem.evaluation.rungs.calibrated_robot import calibrated
 from golem.evaluation.rungs.counter import ACROSS, AREA, FREE, LOOK, TIGHT, radius
-from golem.evaluation.rungs.kitchen_rung import Errand, KitchenRung, Verdict
+from golem.evaluation.rungs.kitchen_rung import Errand, KitchenOptions, KitchenRung, Verdict
 from golem.evaluation.rungs.pick_screw import SLOT, doable
 from golem.package_data import load_data
 from golem.robots.mujoco.engine import MujocoRobot
@@ -51,7 +51,7 @@ BESIDE = (14, 16, 18, 20, 25, 30)
 
 
 @dataclass(frozen=True)
-class ErrandsOptions:
+class ErrandsOptions(KitchenOptions):
     """The worlds, and which errands."""
 
     layout: LayoutKind = "nominal"

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, Protocol, TypeVar, cast
+from typing import Any, ClassVar, TypeVar, cast
 
 from golem.errors import ConfigError
 from golem.evaluation.base import DONE, Rung, TrialOutcome, TrialSpec
@@ -31,13 +31,12 @@ SETTLE = 1.0
 """Robot time that doors and things get to come to rest [s]."""
 
 
-class KitchenOptions(Protocol):
-    """Options that say how the kitchen is laid out."""
+@dataclass(frozen=True)
+class KitchenOptions:
+    """The kitchen."""
 
-    @property
-    def layout(self) -> LayoutKind:
-        """Whether it is drawn from the trial's seed."""
-        ...
+    layout: LayoutKind = "varied"
+    """nominal: the counter always has one height and one colour. varied: drawn from the trial's seed."""
 
 
 @dataclass(frozen=True, slots=True)

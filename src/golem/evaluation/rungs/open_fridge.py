@@ -14,7 +14,7 @@ import numpy as np
 from golem.evaluation.base import DONE, TrialSpec
 from golem.evaluation.episodes.counter_watch import ErrandWatch
 from golem.evaluation.episodes.oracle import Oracle
-from golem.evaluation.rungs.kitchen_rung import Errand, KitchenRung, Verdict
+from golem.evaluation.rungs.kitchen_rung import Errand, KitchenOptions, KitchenRung, Verdict
 from golem.robots.mujoco.balance import BalanceRecorder
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.worlds.conditions import LayoutKind
@@ -28,7 +28,7 @@ OPENED = 0.30
 
 
 @dataclass(frozen=True)
-class FridgeOptions:
+class FridgeOptions(KitchenOptions):
     """The kitchen."""
 
     layout: LayoutKind = "varied"
