@@ -19,8 +19,9 @@ from golem.dashboard.live import LiveView
 from golem.dashboard.status import Timeline
 from golem.errors import ConfigError, MissingExtra
 from golem.evaluation.episodes.oracle import Oracle
+from golem.evaluation.harness.run_folder import make_folder
 from golem.evaluation.report.demo_page import PickRecord, balance_figures, balance_section, demo_page
-from golem.output_file import make_folder, write_file
+from golem.output_file import write_file
 from golem.provenance import command_line, commit, versions
 from golem.robots.mujoco.balance import BalanceRecorder
 from golem.robots.mujoco.config import WORKSHOPS

@@ -11,10 +11,11 @@ from typing import Any
 from golem.dashboard.film import Film
 from golem.demo import DemoConfig
 from golem.evaluation.base import TrialSpec, make_rung
+from golem.evaluation.harness.run_folder import make_folder
 from golem.evaluation.harness.trials import run_trial
 from golem.evaluation.rung_table import RUNGS
 from golem.evaluation.rungs.whole_pack import WholePackOptions
-from golem.output_file import make_folder, write_file
+from golem.output_file import write_file
 from golem.robots.mujoco.balance import BalanceRecorder
 from golem.run import Narrator
 

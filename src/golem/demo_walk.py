@@ -12,7 +12,8 @@ from golem.dashboard.film import Film
 from golem.dashboard.live import LiveView
 from golem.demo import DemoConfig
 from golem.evaluation.episodes.oracle import ContactWatch
-from golem.output_file import make_folder, write_file
+from golem.evaluation.harness.run_folder import make_folder
+from golem.output_file import write_file
 from golem.robots.mujoco.balance import BalanceRecorder
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.run import Narrator, on_air, shown

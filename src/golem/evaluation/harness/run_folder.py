@@ -21,7 +21,7 @@ from typing import Any
 from golem.errors import ConfigError, OutputError, unknown_name
 from golem.evaluation.base import RUNGS, TrialOutcome, TrialSpec, case_name
 from golem.evaluation.harness.records import Provenance, TrialRecord, artefacts, read_records, whole_lines
-from golem.output_file import make_folder, write_file
+from golem.output_file import write_file
 from golem.provenance import changes
 
 FACTS = "run.json"
@@ -169,6 +169,16 @@ class RunFolder(AbstractContextManager["RunFolder", None]):
     def write_text(self, name: str, text: str) -> Path:
         """Write a file of the folder, whole or not at all, and return its path."""
         return write_file(self.path / name, text)
+
+
+def make_folder(folder: Path) -> None:
+    """Make the folder of an --out where needed. Raises OutputError: it cannot be made, read or written."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"Cannot write to --out {folder}: {error.strerror}; choose another.") from error
+    if not os.access(folder, os.R_OK | os.W_OK | os.X_OK):
+        raise OutputError(f"Cannot write to --out {folder}: Permission denied; choose another.")
 
 
 def finished_records(folder: Path) -> list[TrialRecord]:

@@ -14,8 +14,8 @@ import numpy as np
 import torch
 
 from golem.errors import ConfigError
+from golem.evaluation.harness.run_folder import make_folder
 from golem.native import Records
-from golem.output_file import make_folder
 from golem.provenance import commit
 from golem.training.legs.checkpoint import CHECKPOINT, CURVE, cut_curve, read_checkpoint
 from golem.training.legs.env import KNOWN, PERIOD, SEEN, TASKS, EnvConfig, Task
