@@ -63,7 +63,8 @@ class JobWorld:
         asked: numbers of the fasteners that were asked for, in order.
         out: those that are out of their places; with the file `world.txt` of the folder they outlive the process.
         walked: way that the robot was sent along [m].
-        palm_off: where palm cameras see fasteners, from where they are in odom [m].
+        palm_off: where palm cameras see fasteners, from where they are, in base_link [m].
+        told: by how much each pick was told that they are off, in base_link [m].
     """
 
     def __init__(self, places: Array, folder: Path, says: Says = picked, fails: str = "") -> None:
@@ -71,7 +72,7 @@ class JobWorld:
         self.log = folder / "world.txt"
         lines = self.log.read_text().split("\n") if self.log.exists() else []
         self.out = {int(line[4:]) for line in lines if line.startswith("out ")}
-        self.asked, self.palm_off = list[int](), (0.0, 0.0)
+        self.asked, self.palm_off, self.told = list[int](), (0.0, 0.0), list[tuple[float, ...]]()
         self.goals = list[Any]()
         self.walked, self.bus, self.t = 0.0, Bus(), 0.0
         self.pose = Pose(-0.7, 0.0, 0.0)
@@ -119,15 +120,15 @@ class JobWorld:
         in_pack = NEAR_EDGE.to(at(goal.wanted))
         number = int(np.hypot(self.places[:, 0] - in_pack.x, self.places[:, 1] - in_pack.y).argmin())
         self.asked.append(number)
+        self.told.append(tuple(self.pose.matrix()[:2, :2].T @ goal.off) if goal.off else ())
         self.write(f"ask {number}")
         if number in self.out:
             return SkillResult(False, "detect", "localizer", "Nothing.", value=PickReport("nothing_there"))
         report = self.says(number, self.asked.count(number))
         there = NEAR_EDGE @ at(self.places[number])
         if report.outcome != PickOutcome.NOTHING_THERE:
-            report.tried = [
-                Tried(goal.side, there.x + self.palm_off[0], there.y + self.palm_off[1], 0.0, report.outcome)
-            ]
+            x, y = (there.x, there.y) + self.pose.matrix()[:2, :2] @ self.palm_off
+            report.tried = [Tried(goal.side, x, y, 0.0, report.outcome)]
         if report.outcome == PickOutcome.PICKED:
             self.write(f"out {number}")
             self.out.add(number)

@@ -377,7 +377,8 @@ def test_what_a_palm_camera_is_off_by_is_told_to_the_next_pick_of_that_hand(tmp_
     result = world.run(GOAL)
     assert result.value.fates == ["in_tray"] * 32 and world.asked == list(dict.fromkeys(world.asked))
     for side in ("left", "right"):
-        told = [goal.off for goal in world.goals if getattr(goal, "side", "") == side]
+        picks = (goal for goal in world.goals if hasattr(goal, "off"))
+        told = [off for goal, off in zip(picks, world.told, strict=True) if goal.side == side]
         assert told[0] == () and told[1:] == [pytest.approx(world.palm_off, abs=1e-3)] * (len(told) - 1)
 
 

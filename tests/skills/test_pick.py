@@ -183,6 +183,23 @@ def test_a_hand_lets_go_where_both_cameras_say_and_leaves_out_what_is_far_off_or
     np.testing.assert_allclose(let_go[0][:2], TRAY[:2] + goes, atol=1e-9)
 
 
+@pytest.mark.parametrize("turned", [0.0, 0.5 * np.pi, -2.0])
+def test_the_hand_has_its_heading_from_where_the_robot_faces(
+    turned: float, full: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The map of reach is of one heading in base_link: beside a pack the robot faces another way than in odom."""
+    asked = list[float]()
+
+    class Recording(Centroid):
+        def propose(self, target: Any, scene: Any, gripper: Gripper) -> list[Grasp]:
+            asked.append(gripper.yaw)
+            return super().propose(target, scene, gripper)
+
+    monkeypatch.setattr(type(full.context), "heading", turned)
+    picked(full, Recording())
+    np.testing.assert_allclose(asked[0], turned + CONFIG.heading("right"))
+
+
 def test_the_extraction_is_straight_and_slow(full: Any) -> None:
     picked(full)
     path = np.array([T[:3, 3] for T in full.sent])

@@ -186,6 +186,11 @@ class Context:
         return np.eye(4) if base is None else base.T_odom_base
 
     @property
+    def heading(self) -> float:
+        """Heading of base_link in odom [rad]."""
+        return PlanarPose.of(self.T_odom_base).yaw
+
+    @property
     def mapped(self) -> bool:
         """Whether there is a map, and the robot's place in it is known."""
         return self.bus.latest(topics.MAP) is not None and self.bus.latest(topics.MAP_POSE) is not None
@@ -281,7 +286,7 @@ class Context:
             method: from `grasp_method`.
             target: as a camera saw it.
             side: of the hand that is to grasp.
-            yaw: heading of the gripper's x axis about the vertical that suits the arm best [rad].
+            yaw: heading of the gripper's x axis about the vertical that suits the arm best, in odom [rad].
             approach: direction in odom along which the hand is to come, of unit length.
             scene: (n, 3) points in odom of what is around [m]; by default what the head camera shows.
         """

@@ -80,7 +80,7 @@ class PackJob:
         self._sides = PackSides(np.array([one.place for one in book.fasteners]))
         self._T_odom_pack = PlanarPose(0.0, 0.0, 0.0)
         self._rim = SeenRim()  # above base_link, had the legs no height
-        self._off = dict[str, Array]()  # (2,) from where the head camera sees things to where that of a hand does [m]
+        self._off = dict[str, Array]()  # (2,) from what the head camera sees to what a hand's does, in base_link [m]
         self._full, self._strikes = set[str](), 0
         self._stops: list[PackStop] = []
 
@@ -324,7 +324,7 @@ class PackJob:
         await self._tell(one, Fate.TRYING, side=side, stance=stance)
         (x, y), name = self._in_odom(one).tolist(), container if listed is None else listed.name
         at = () if listed is None else tuple(self._in_odom(listed).tolist())
-        off = tuple(self._off[side].tolist()) if side in self._off else ()
+        off = tuple((self._context.T_odom_base[:2, :2] @ self._off[side]).tolist()) if side in self._off else ()
         near = [other for other in self._left if math.dist(other.place, one.place) < AROUND]
         marks = tuple(v for other in near for v in (*self._in_odom(other).tolist(), self._level(other)))
         goal = PickGoal(one.label, container, side, (), (x, y), (self._level(one),), at, off, marks)
@@ -361,12 +361,13 @@ class PackJob:
     def _which(self, one: PackFastener, found: PickReport) -> PackFastener:
         """Return which fastener a hand was at that was sent to `one`, and learn what the palm cameras are off by."""
         there, tried = self._left, found.tried[-1]
-        place, known = np.array([tried.x, tried.y]), np.array(found.off or self._off.get(tried.side, (0.0, 0.0)))
+        place, turn = np.array([tried.x, tried.y]), self._context.T_odom_base[:2, :2]
+        known = np.array(found.off or turn @ self._off.get(tried.side, np.zeros(2)))
         left = [np.linalg.norm(place - known - self._in_odom(each)) for each in there]
         nearest = int(np.argmin(left))
         taken = there[nearest] if left[nearest] < WANTED / 2 else one
         if np.linalg.norm(off := place - self._in_odom(taken)) < FARTHEST_OFF:
-            self._off[tried.side] = off
+            self._off[tried.side] = turn.T @ off
         return taken
 
     async def _tell(

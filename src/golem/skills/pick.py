@@ -188,7 +188,8 @@ class Pick:
 
     async def _approach(self, context: Context, attempt: Attempt) -> Grasp:
         """Bring the open hand over the object, turned as it can be: first across, where else a finger has no room."""
-        refused, headings = list[StageFailed](), [self._config.heading(attempt.side) + t for t in self._config.turns]
+        refused, best = list[StageFailed](), context.heading + self._config.heading(attempt.side)
+        headings = [best + turn for turn in self._config.turns]
         for yaw in (*([] if self._across is None else (self._across, self._across - math.pi)), *headings):
             grasps = await context.propose(self._method, self._aim(attempt), attempt.side, yaw)
             if not grasps:

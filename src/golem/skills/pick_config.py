@@ -173,7 +173,7 @@ class PickConfig:
         workspace: where `lines` looks for objects: x_min, x_max, y_min, y_max, z_min, z_max in base_link [m], for the
             right arm (y is mirrored for the left). The paper's box (x <= 0.60, |y| <= 0.45, -0.05 <= z <= 0.60) but
             for z, which reaches 0.10 m deeper. `planned` asks the map of reach instead.
-        yaw: heading of the gripper's x axis when it points down [rad], right arm; mirrored for the left.
+        yaw: heading of the gripper's x axis when it points down, in base_link [rad], right arm; mirrored for the left.
         turns: turns from that heading that are tried in order, where the hand cannot come as before [rad].
         container_radius: objects nearer than this to the container's middle lie in it and are left there [m].
         sure: score from which on a container counts whose shape does not show.
@@ -246,5 +246,5 @@ class PickConfig:
     timeout: float = 240.0
 
     def heading(self, side: Side) -> float:
-        """Return `yaw` for a hand [rad]."""
+        """Return `yaw` for a hand, in base_link [rad]."""
         return self.yaw if side == "right" else -self.yaw

@@ -205,7 +205,7 @@ class Take:
         from golem.skills.travel import blaming
 
         c, way = self._config, self._way(context, target, kind)
-        yaw = 0.5 * math.pi if side == "left" else -0.5 * math.pi
+        yaw = context.heading + (0.5 * math.pi if side == "left" else -0.5 * math.pi)
         self._report.side, self._report.approach = side, kind
         context.say("approach", f"Bringing the {side} hand before the {target.label}, {kind}.", side=side)
         context.hands[side].open(MAX_GAP)

@@ -20,7 +20,7 @@ class Gripper:
     Attributes:
         side: which hand.
         T_odom_gripper: (4, 4) where its grasp frame is, by the measured joints and the base estimate.
-        yaw: heading of its x axis about the vertical that suits the arm best [rad]; of a hand that points down.
+        yaw: heading in odom of its x axis about the vertical that suits the arm best [rad]; of a hand that points down.
         approach: (3,) unit vector in odom along which the task wants the hand to come; straight down by default.
         q: (15,) joints of torso, left arm, right arm [rad]; None where nobody says.
         T_odom_base: (4, 4) pose of base_link in odom.
