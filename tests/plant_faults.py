@@ -52,9 +52,9 @@ FAULTS = {
     ),
     "estimator-turns-backwards": PlantedFault(
         "hardware/estimator/random_walk_kf.py",
-        "return -(turning + rates) @ R.swapaxes(-1, -2)",
-        "return -(rates - turning) @ R.swapaxes(-1, -2)",
-        ("tests/hardware/estimator/test_random_walk.py", "tests/hardware/estimator/test_base_estimators.py"),
+        "moving[0] = omega[1] * z - omega[2] * y + feet.rates[k, 0]",
+        "moving[0] = omega[2] * y - omega[1] * z + feet.rates[k, 0]",
+        ("tests/hardware/estimator/test_base_estimators.py",),
     ),
     "estimator-half-bias": PlantedFault(
         "hardware/estimator/attitude.py",

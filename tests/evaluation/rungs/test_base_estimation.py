@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.hardware.estimator.sensed_feet import Feet
+from tests.hardware.estimator.sensed_feet import Feet, base_velocity
 
 from golem.capabilities.legs.hold import STANCES
 from golem.errors import ConfigError
@@ -15,7 +15,6 @@ from golem.evaluation.harness.ladder import LadderConfig, run_ladder
 from golem.evaluation.rungs import base_estimation as walks
 from golem.evaluation.rungs.base_estimation import BaseEstimation, RecordedWalk, _way, follow, slipping, wrong_contacts
 from golem.hardware.estimator.feet import FeetConfig
-from golem.hardware.estimator.random_walk_kf import base_velocity
 from golem.robots.model.leg_kernel import LegDynamics
 from golem.robots.model.spatial import rotation_rpy
 from golem.types import LEGS, NUM_JOINTS, Array, Imu, LowState

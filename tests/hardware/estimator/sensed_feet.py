@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from golem.hardware.estimator.feet import FEET, FeetConfig, put_feet, sense_feet
 from golem.native import new_record
+from golem.robots.model.spatial import skew
 from golem.types import Array, LowState
 
 
@@ -59,3 +60,20 @@ class Feet:
     def local(self) -> Array:
         """(2, 3) centre of pressure from the middle of the sole, axes of the foot [m]."""
         return self._memory["local"].copy()
+
+
+def base_velocity(R: Array, omega: Array, soles: Array, rates: Array) -> Array:
+    """Return the (..., 2, 3) velocity of base_link that each foot implies if it stands still [m/s], world axes.
+
+        z_k = -R_b [omega_b x p_k + J_k dq]
+
+    which is the paper's eq. (legodom) with omega in base_link, where p_k and J_k dq are known.
+
+    Args:
+        R: (..., 3, 3) rotation of base_link in the world-fixed frame.
+        omega: (..., 3) angular rate of base_link, in base_link [rad/s].
+        soles: (..., 2, 3) points of the left and the right foot, in base_link [m].
+        rates: (..., 2, 3) their velocities relative to base_link, in base_link: J_k dq [m/s].
+    """
+    turning = soles @ skew(omega).swapaxes(-1, -2)
+    return -(turning + rates) @ R.swapaxes(-1, -2)

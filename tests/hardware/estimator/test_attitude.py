@@ -10,13 +10,12 @@ import mujoco
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from tests.hardware.estimator.sensed_feet import Feet
+from tests.hardware.estimator.sensed_feet import Feet, base_velocity
 
 from golem.hardware.estimator.attitude import GYRO_BIAS, Attitude, track_bias
 from golem.hardware.estimator.feet import FeetConfig
-from golem.hardware.estimator.random_walk_kf import base_velocity
 from golem.native import new_record
-from golem.robots.model.imu_mount import TORSO, base_rate
+from golem.robots.model.imu_mount import sensed_base_rate
 from golem.robots.model.spatial import rotation_rpy
 from golem.robots.model.table import FRAMES
 from golem.types import NUM_JOINTS, Array
@@ -52,9 +51,7 @@ def test_rotation_and_rate_are_mujocos(seed: int, tumbling: Callable[[int], Any]
     world = tumbling(seed)
     attitude, state, R = Attitude(), world.state(), world.T[:3, :3]
     np.testing.assert_allclose(attitude.rotation(state), R, atol=1e-9)
-    np.testing.assert_allclose(
-        base_rate(state.imu.gyro, state.q[TORSO], state.dq[TORSO]), world.data.qvel[3:6], atol=1e-9
-    )
+    np.testing.assert_allclose(sensed_base_rate(state), world.data.qvel[3:6], atol=1e-9)
     attitude.reset(state)
     heading = math.atan2(R[1, 0], R[0, 0])
     np.testing.assert_allclose(attitude.rotation(state), about_z(-heading) @ R, atol=1e-9)
@@ -64,7 +61,7 @@ def test_rotation_and_rate_are_mujocos(seed: int, tumbling: Callable[[int], Any]
 def test_a_foot_implies_the_velocity_of_the_base_less_its_own(seed: int, tumbling: Callable[[int], Any]) -> None:
     world = tumbling(seed)
     state, R = world.state(), world.T[:3, :3]
-    feet, omega = Feet(FeetConfig()), base_rate(state.imu.gyro, state.q[TORSO], state.dq[TORSO])
+    feet, omega = Feet(FeetConfig()), sensed_base_rate(state)
     feet.step(state, R[2], omega, 0.002)
     implied = base_velocity(R, omega, feet.points, feet.rates)
     for k, body in enumerate(world.feet):

@@ -12,7 +12,7 @@ from tests.hardware.estimator.sensed_feet import Feet
 
 from golem.hardware.estimator.attitude import Attitude
 from golem.hardware.estimator.feet import FeetConfig
-from golem.robots.model.imu_mount import TORSO, base_rate
+from golem.robots.model.imu_mount import sensed_base_rate
 from golem.robots.model.leg_kernel import LegDynamics
 from golem.types import LEGS, NUM_JOINTS, LowState
 
@@ -20,8 +20,7 @@ DT = 0.002
 
 
 def sense(feet: Feet, state: LowState) -> None:
-    omega = base_rate(state.imu.gyro, state.q[TORSO], state.dq[TORSO])
-    feet.step(state, Attitude().rotation(state)[2], omega, DT)
+    feet.step(state, Attitude().rotation(state)[2], sensed_base_rate(state), DT)
 
 
 def test_the_torques_of_a_standing_robot_carry_its_weight(world: Callable[..., Any]) -> None:

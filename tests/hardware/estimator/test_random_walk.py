@@ -4,16 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests.hardware.estimator.sensed_feet import base_velocity
 
 from golem.hardware.estimator.feet import Contact, ContactConfig
-from golem.hardware.estimator.random_walk_kf import (
-    FILTER,
-    RandomWalk,
-    RandomWalkConfig,
-    base_velocity,
-    filter_options,
-    fuse,
-)
+from golem.hardware.estimator.random_walk_kf import FILTER, RandomWalk, RandomWalkConfig, filter_options, fuse
 from golem.native import new_record
 
 DT = 0.002

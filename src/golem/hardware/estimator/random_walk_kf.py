@@ -24,7 +24,6 @@ from golem.hardware.estimator.feet import FEET, FLOOR, FeetConfig, forget_feet, 
 from golem.kernels import njit
 from golem.native import ORDINARY, UNUSUAL, CompiledStage, Record, Records, new_record, shared, stage_code, view
 from golem.robots.model.imu_mount import TORSO, turn_to_base
-from golem.robots.model.spatial import skew
 from golem.types import Array, LowState
 
 
@@ -51,23 +50,6 @@ class RandomWalkConfig:
     start: float = 0.1
 
 
-def base_velocity(R: Array, omega: Array, soles: Array, rates: Array) -> Array:
-    """Return the (..., 2, 3) velocity of base_link that each foot implies if it stands still [m/s], world axes.
-
-        z_k = -R_b [omega_b x p_k + J_k dq]
-
-    which is the paper's eq. (legodom) with omega in base_link, where p_k and J_k dq are known.
-
-    Args:
-        R: (..., 3, 3) rotation of base_link in the world-fixed frame.
-        omega: (..., 3) angular rate of base_link, in base_link [rad/s].
-        soles: (..., 2, 3) points of the left and the right foot, in base_link [m].
-        rates: (..., 2, 3) their velocities relative to base_link, in base_link: J_k dq [m/s].
-    """
-    turning = soles @ skew(omega).swapaxes(-1, -2)
-    return -(turning + rates) @ R.swapaxes(-1, -2)
-
-
 FILTER = np.dtype([("options", "f8", (5,)), ("velocity", "f8", (3,)), ("variance", "f8"), ("unmeasured", "f8")])
 """Options, see `filter_options`, and memory of `fuse`, of one robot."""
 
@@ -83,7 +65,7 @@ def fuse(m: Record, measured: Array, weight: Array, dt: float) -> Array:
 
     Args:
         m: the memory of one robot, a `FILTER`.
-        measured: (2, 3) the velocity that each foot implies, see `base_velocity` [m/s].
+        measured: (2, 3) the velocity that each foot implies if it stands still [m/s], world axes.
         weight: (2,) how far each foot is to be believed, 0 to 1, from `feet.contact`.
         dt: time since the previous estimate [s].
     """
@@ -195,7 +177,7 @@ def random_walk(r: Record, m: Record) -> None:
     turn_to_base(gyro, r.q[TORSO], r.dq[TORSO], omega)
     sense_feet(feet, r.q, r.dq, r.tau, up, omega, dt)
 
-    # What each foot implies if it stands still; see `base_velocity`.
+    # What each foot implies if it stands still: -R [omega x p + J dq], eq. (legodom) of the paper.
     measured, moving = np.empty((2, 3)), np.empty(3)
     for k in range(2):
         x, y, z = feet.points[k, 0], feet.points[k, 1], feet.points[k, 2]

@@ -14,22 +14,16 @@ TORSO = JOINT_INDEX["torso_joint"]
 """Motor index of the waist: the only joint between base_link and the IMU, about their common z."""
 
 
-def base_rate(gyro: Array, waist: Array, waist_rate: Array) -> Array:
-    """Return the (..., 3) angular rate of base_link in base_link: Rz(waist) gyro - (0, 0, waist_rate) [rad/s].
-
-    Args:
-        gyro: (..., 3) angular rate of the torso in imu_link, whose axes are the torso's [rad/s].
-        waist: (...) position of `torso_joint` [rad].
-        waist_rate: (...) its velocity [rad/s].
-    """
-    c, s = np.cos(waist), np.sin(waist)
-    x, y, z = gyro[..., 0], gyro[..., 1], gyro[..., 2]
-    return np.stack([c * x - s * y, s * x + c * y, z - waist_rate], axis=-1)
-
-
 @njit(cache=True, nogil=True)
 def turn_to_base(gyro: Array, waist: float, waist_rate: float, out: Array) -> None:
-    """Write what `base_rate` returns of one sample into `out` (3,)."""
+    """Write into `out` (3,) the angular rate of base_link in base_link: Rz(waist) gyro - (0, 0, waist_rate) [rad/s].
+
+    Args:
+        gyro: (3,) angular rate of the torso in imu_link, whose axes are the torso's [rad/s].
+        waist: position of `torso_joint` [rad].
+        waist_rate: its velocity [rad/s].
+        out: filled.
+    """
     c, s = math.cos(waist), math.sin(waist)
     x, y, z = gyro[0], gyro[1], gyro[2]
     out[0], out[1], out[2] = c * x - s * y, s * x + c * y, z - waist_rate

@@ -290,7 +290,7 @@ class BatchWorld:
         c, rng = self.config, self._rng
         base = self._qvel[:, None, :3]
         soles = self._sensors[:, self.ids.sole_velocity.ravel()].reshape(-1, 2, 3)
-        # What `random_walk_kf.base_velocity` yields with exact kinematics, in closed form, and noise on top.
+        # What a foot that stands still implies with exact kinematics, in closed form, and noise on top.
         measured = base - soles + rng.normal(0.0, c.foot_noise, soles.shape)
         force = self._sensors[:, self.ids.touch] * self._force_scale
         _, weight = self._contact.step(force, STEP)
