@@ -13,7 +13,7 @@ from golem.interfaces.payloads import Detections, LegStatus
 from golem.middleware.ros.message import CodecError
 from golem.middleware.ros.msgs.diagnostic_msgs import DiagnosticStatus
 from golem.middleware.ros.msgs.geometry_msgs import Point, Pose, Quaternion
-from golem.types import BaseEstimate, Detection, HandCommand, HandState, Imu, LocalizedObject, PlanarPose, Twist
+from golem.types import BaseEstimate, Detection, HandCommand, HandState, LocalizedObject, PlanarPose, Twist
 
 
 def T(rpy: tuple[float, float, float], xyz: tuple[float, float, float]) -> np.ndarray:
@@ -87,14 +87,6 @@ def test_joints_keep_their_order() -> None:
     message = convert.joint_state(2.0, ["a", "b"], np.array([1.0, 2.0]), np.array([3.0, 4.0]), np.zeros(0))
     assert message.name == ["a", "b"]
     assert message.velocity.tolist() == [3.0, 4.0] and message.effort.size == 0
-
-
-def test_the_imu_keeps_axes_and_frame() -> None:
-    sample = Imu(np.array([0.0, 1.0, 0.0, 0.0]), np.array([1.0, 2.0, 3.0]), np.array([0.0, 0.0, -9.81]))
-    message = convert.imu(0.5, sample, "imu_link")
-    assert message.header.frame_id == "imu_link"
-    assert message.orientation == Quaternion(1.0, 0.0, 0.0, 0.0)
-    assert message.angular_velocity.y == 2.0 and message.linear_acceleration.z == -9.81
 
 
 def test_velocity_commands_survive() -> None:

@@ -19,7 +19,7 @@ from golem.middleware.ros.msgs.geometry_msgs import PoseStamped
 from golem.middleware.ros.msgs.nav_msgs import Odometry
 from golem.middleware.ros.msgs.std_msgs import Float64, Header
 from golem.middleware.ros.msgs.tf2_msgs import TFMessage
-from golem.types import Array, BaseEstimate, HandCommand, HandState, Imu, PlanarPose, Twist
+from golem.types import Array, BaseEstimate, HandCommand, HandState, PlanarPose, Twist
 
 POSE_COVARIANCE = np.diag(np.square([0.03, 0.03, 0.01, 0.01, 0.01, 0.03])).ravel()
 """Of position [m^2] and roll, pitch, yaw [rad^2], in odom [own: what 3 m of walking add, `golem bench estimation`; the
@@ -106,12 +106,6 @@ def joint_state(t: float, names: Sequence[str], q: Array, dq: Array, tau: Array)
     """Return positions [rad], velocities [rad/s] and torques [N m] of joints, each (n,); empty where not known."""
     values = (np.ascontiguousarray(v, np.float64) for v in (q, dq, tau))
     return sensor_msgs.JointState(header(t), list(names), *values)
-
-
-def imu(t: float, sample: Imu, frame: str) -> sensor_msgs.Imu:
-    """Return a sample of the IMU in `frame`; its covariances are unknown, which ROS writes as zeros."""
-    quat, gyro, acc = quaternion(sample.quat), vector(sample.gyro), vector(sample.acc)
-    return sensor_msgs.Imu(header=header(t, frame), orientation=quat, angular_velocity=gyro, linear_acceleration=acc)
 
 
 def twist(command: Twist) -> geometry_msgs.Twist:

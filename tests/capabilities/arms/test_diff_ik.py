@@ -12,7 +12,7 @@ from golem.capabilities.arms.base import TargetError, UpperBody
 from golem.capabilities.arms.diff_ik import DiffIK
 from golem.capabilities.arms.line import Line
 from golem.capabilities.arms.postures import downward, posture
-from golem.capabilities.arms.task_space import NEAR, TaskSpaceConfig
+from golem.capabilities.arms.task_space import TaskSpaceConfig
 from golem.capabilities.collision.collision_model import CollisionModel
 from golem.capabilities.collision.sphere_robot import load_spheres
 from golem.errors import ConfigError
@@ -303,18 +303,9 @@ def test_links_are_kept_apart_on_request() -> None:
             distances.append((*spheres.nearest(command.q, 1, 0.2).distance, 0.2)[0])
         nearest[rows] = min(distances)
         if rows:
-            assert ik.report().clearance == pytest.approx(distances[-1])
+            assert ik.task.distance[0] == pytest.approx(distances[-1])
             assert command.error_position[1] > 0.02
     assert nearest[0] < -0.005 and nearest[6] > 0.0
-
-
-def test_the_report_says_how_well_the_arms_stand(ik: DiffIK) -> None:
-    report = ik.report()
-    for i, side in enumerate(SIDES):
-        assert 0.0 < report.margin[i] < ik.kinematics.margin(side, ik.q)
-        assert report.manipulability[i] == pytest.approx(ik.kinematics.manipulability(side, ik.q), rel=1e-6)
-    assert 0.0 < report.clearance < NEAR
-    assert DiffIK(TaskSpaceConfig(collision_rows=0)).report().clearance == np.inf
 
 
 def test_steps_are_damped_at_a_singularity() -> None:
@@ -324,7 +315,7 @@ def test_steps_are_damped_at_a_singularity() -> None:
     def largest(damping: float) -> float:
         ik = DiffIK(TaskSpaceConfig(singular_damping=damping, singular_value=0.05, palm_speed=10.0))
         ik.reset(whole(straight))
-        assert ik.report().manipulability[0] < 0.05
+        assert ik.kinematics.manipulability("left", ik.q) < 0.05
         goal = ik.kinematics.pose("left", ik.q)
         goal[:3, 3] += goal[:3, 2] * 0.003
         return float(np.abs(ik.step(goal, None, whole(straight), 1.0).q - straight).max())

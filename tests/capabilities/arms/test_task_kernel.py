@@ -50,7 +50,8 @@ class PythonIK:
                 to_frame = pin.exp6(-residual)
             rows.append(root[:, None] * (pin.Jlog6(to_frame) @ k.jacobian(side)))
             wanted.append(c.palm_gain * root * residual)
-            lost = max(0.0, 1.0 - k.singular_value(side) / c.singular_value)
+            J = k.jacobian(side)[:, ARM_COLUMNS[side]]
+            lost = max(0.0, 1.0 - np.sqrt(max(np.linalg.eigvalsh(J @ J.T)[0], 0.0)) / c.singular_value)
             singular += c.singular_damping * lost**2
         if self.ticks % SINGULAR_TICKS == 0:
             self.singular = singular

@@ -70,11 +70,6 @@ class UpperKinematics:
         self.update(q)
         return float(np.linalg.svd(self.jacobian(side)[:, ARM_COLUMNS[side]], compute_uv=False)[-1])
 
-    def singular_value(self, side: Side) -> float:
-        """Return `manipulability` at the joints last updated, from the eigenvalues of J J^T: in half the time."""
-        J = self.jacobian(side)[:, ARM_COLUMNS[side]]
-        return float(np.sqrt(max(np.linalg.eigvalsh(J @ J.T)[0], 0.0)))
-
     def margin(self, side: Side, q: Array) -> float:
         """Return the distance of the arm's joints from their nearest mechanical stop at `q` (15,) [rad]."""
         columns, (lower, upper) = ARM_COLUMNS[side], self.stops

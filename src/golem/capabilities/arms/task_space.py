@@ -11,7 +11,7 @@ import numpy as np
 
 from golem.capabilities.arms import task_kernel
 from golem.capabilities.arms.arm_kinematics import UpperKinematics
-from golem.capabilities.arms.base import ARM_COLUMNS, NUM_UPPER, check_dt, check_joints, check_pose
+from golem.capabilities.arms.base import NUM_UPPER, check_dt, check_joints, check_pose
 from golem.capabilities.arms.ik_kernel import rigid
 from golem.capabilities.arms.postures import posture
 from golem.errors import ConfigError
@@ -101,21 +101,6 @@ _POSITIVE = (
 """Options that are more than 0; the others, all but the posture, are at least that."""
 
 
-@dataclass(frozen=True, slots=True)
-class ArmReport:
-    """How well the arms stand.
-
-    Attributes:
-        margin: (2,) distance of the left and right arm's joints from the range that the gate allows [rad].
-        manipulability: (2,) smallest singular value of each arm's Jacobian [m and rad mixed].
-        clearance: distance of the nearest two links [m], infinite where none is near or none is looked at.
-    """
-
-    margin: Array
-    manipulability: Array
-    clearance: float
-
-
 class TaskSpaceController(ABC):
     """Integrates the joint steps that a subclass solves for; see `UpperBody` for the contract.
 
@@ -180,16 +165,6 @@ class TaskSpaceController(ABC):
         """The model, updated at the command state."""
         self._kinematics.update(self.q)
         return self._kinematics
-
-    def report(self) -> ArmReport:
-        """Return how well the arms stand at the command state."""
-        k = self.kinematics
-        room = np.minimum(self.q - k.lower, k.upper - self.q)
-        return ArmReport(
-            np.array([room[ARM_COLUMNS[side]].min() for side in SIDES]),
-            np.array([k.singular_value(side) for side in SIDES]),
-            float(self.task.distance[0]) if self.task.state[task_kernel.COUNT] else np.inf,
-        )
 
     def reset(self, q: Array) -> None:
         self._ticks = 0

@@ -31,12 +31,10 @@ class Match:
     Attributes:
         pose: of the scan's frame in the landmarks'.
         share: of its points that are within 0.15 m of a landmark.
-        residual: RMS distance of those from their lines [m].
     """
 
     pose: PlanarPose
     share: float
-    residual: float
 
 
 class Landmarks:
@@ -44,7 +42,6 @@ class Landmarks:
 
     def __init__(self, places: Array) -> None:
         """Take (n, 2) places [m]; n is at least 1."""
-        self._places = places
         self._tree = KDTree(places)
         n = min(NEIGHBOURS, len(places))
         around = places[self._tree.query(places, n)[1].reshape(len(places), n)]
@@ -100,12 +97,8 @@ class Landmarks:
             x, reach = x + step, max(0.15, 0.7 * reach)
             if np.abs(step).max() < 1e-5:
                 break
-        distance, index = self._nearest(_moved(points, x), 0.15)
-        near = np.isfinite(distance)
-        off = _moved(points, x)[near] - self._middles[index[near]]
-        across = (self._normals[index[near]] * off).sum(axis=1)
-        residual = float(np.sqrt(np.mean(across**2))) if near.any() else FAR
-        return Match(PlanarPose(float(x[0]), float(x[1]), wrap(float(x[2]))), float(near.mean()), residual)
+        near = np.isfinite(self._nearest(_moved(points, x), 0.15)[0])
+        return Match(PlanarPose(float(x[0]), float(x[1]), wrap(float(x[2]))), float(near.mean()))
 
     def _nearest(self, points: Array, reach: float) -> tuple[Array, NDArray[np.int64]]:
         """Return the (n,) distance of the landmark nearest to each point (n, 2), infinite beyond `reach`, and which."""

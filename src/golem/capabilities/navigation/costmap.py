@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from golem.interfaces.nav_payloads import OccupancyGrid
 from golem.options import require
-from golem.types import Array, PlanarPose
+from golem.types import Array
 
 LETHAL, INSCRIBED, STEEPEST = 254.0, 253.0, 252.0
 """Costs of a cell with an obstacle, of one nearer to an obstacle than the robot's inscribed radius, and the highest of
@@ -116,13 +116,6 @@ class Costmap:
         found = np.full(len(points), outside)
         found[inside] = self.clearance[row[inside], column[inside]]
         return found
-
-    def straight(self, start: PlanarPose, end: PlanarPose, highest: float = STEEPEST) -> bool:
-        """Return whether no cell on the straight line between two poses costs more than `highest`."""
-        length = math.hypot(end.x - start.x, end.y - start.y)
-        share = np.linspace(0.0, 1.0, max(2, math.ceil(2.0 * length / self.resolution)))[:, None]
-        line = (1.0 - share) * (start.x, start.y) + share * (end.x, end.y)
-        return bool((self.at(line) <= highest).all())
 
 
 def distance_to(full: NDArray[np.bool_], resolution: float) -> Array:

@@ -20,6 +20,7 @@ from golem.capabilities.odometry.plane_map import PlaneMap
 from golem.capabilities.odometry.sensor_agreement import SensorAgreement, up_in_base
 from golem.capabilities.odometry.still_start import MovingStart, StillStart
 from golem.interfaces.lidar import LegOdometry, LidarImu, LidarScan
+from golem.robots.model.spatial import skew
 from golem.robots.sensors.mid360 import P_LIDAR_IMU
 from golem.types import Array
 
@@ -116,8 +117,7 @@ class Lio(Ignores):
         self._buffer: deque[LidarImu | LegOdometry] = deque()
         self._frozen: NDArray[np.float32] | None = None
         self._waist = 0.0
-        self._legs_used = self._legs_used_ahead = -math.inf
-        self._last_scan = -math.inf
+        self._legs_used = -math.inf
         self._fitted_at = -math.inf
         self._fits = self.config.found_after
         self._lost = ""
@@ -133,7 +133,7 @@ class Lio(Ignores):
             if begin is not None and self._agree.stands(up_in_base(begin.R, self._waist), begin.force, sample.t):
                 self._filter = ErrorState(sample.t, begin, self.config.yaw, self.config.imu)
                 self._ahead = self._filter.copy()
-                self._last_scan = self._fitted_at = sample.t
+                self._fitted_at = sample.t
             return
         if not self._agree.imu(sample, self._ahead.t):
             return
@@ -148,9 +148,9 @@ class Lio(Ignores):
         self._agree.legs(legs)
         if self._ahead is None or legs.stale or not self.config.legs:
             return
-        if legs.t - self._legs_used_ahead < self.config.leg_period - 1e-6:
+        if legs.t - self._legs_used < self.config.leg_period - 1e-6:
             return
-        self._legs_used_ahead = legs.t
+        self._legs_used = legs.t
         self._buffer.append(legs)
         self._agree.velocity(self._walk(self._ahead, legs))
 
@@ -209,12 +209,12 @@ class Lio(Ignores):
         # Error of the pose of base_link: the place's, the turn's seen in odom, and the turn's over the lever arm.
         J = np.zeros((6, SIZE))
         J[3:, :3] = Z @ state.R
-        J[:3, :3] = _skew(T[:3, :3] @ arm) @ Z @ state.R
+        J[:3, :3] = skew(T[:3, :3] @ arm) @ Z @ state.R
         J[:3, 3:6] = Z
         J[:2, YAW] = -T[1, 3], T[0, 3]
         J[3:, YAW] = np.array([0.0, 0.0, 1.0]) - T[:3, 2]
         J[3:, GRAVITY_XY] = tilt = turn @ state.level_error()
-        J[:3, GRAVITY_XY] = -_skew(T[:3, 3]) @ tilt
+        J[:3, GRAVITY_XY] = -skew(T[:3, 3]) @ tilt
         covariance = J @ state.P @ J.T
         covariance[:3, :3] += self._birth * np.eye(3)
         self._add_what_the_filter_does_not_know(covariance, T, arm)
@@ -283,7 +283,7 @@ class Lio(Ignores):
         config = self.config
         if not len(self.map):
             self.map.insert(local @ state.R.T + state.p, 0.0)
-            self._fitted_at = self._last_scan = state.t
+            self._fitted_at = state.t
             return
         noise = np.array([config.range_noise**2, config.direction_noise**2, config.overconfidence])
         prior = state.copy()
@@ -311,7 +311,6 @@ class Lio(Ignores):
             P6 = np.ascontiguousarray(np.linalg.inv(whole)[:6, :6], dtype=np.float64)
             if np.abs(step[:3]).max() < 1e-4 and np.abs(step[3:6]).max() < 5e-4:
                 break
-        self._last_scan = state.t
         if not fits:
             self._fits = 0
             return
@@ -352,8 +351,3 @@ def _learn_nothing(P: Array, before: Array, direction: Array) -> None:
         v = np.zeros(SIZE)
         v[first : first + 3] = direction
         P += max(float(v @ (before - P) @ v), 0.0) * np.outer(v, v)
-
-
-def _skew(v: Array) -> Array:
-    x, y, z = v.tolist()
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
