@@ -15,10 +15,10 @@ from golem.capabilities.calibration import view_postures
 from golem.capabilities.calibration.kinematic_fit import ARM, CUFF, VIEWS, TagView, ViewProblem, pose, solve
 from golem.errors import ConfigError
 from golem.hardware.safety.base import SafetyLimits
-from golem.robots.model.magpie_model import T_HAND_CAMERA, cuff_tags, hand_name, tag_corners
+from golem.robots.model.magpie_model import T_HAND_CAMERA, cuff_tags, hand_name
 from golem.robots.model.pinocchio_model import Kinematics
 from golem.robots.sensors.calibration import Calibration
-from golem.robots.sensors.cameras import CAMERAS, project
+from golem.robots.sensors.cameras import CAMERAS
 from golem.types import SIDES, UPPER, Array, CameraInfo, Side
 
 MOUNT = (0.02, 0.005)
@@ -66,11 +66,8 @@ class _HandProblem(ViewProblem):
     """The unknowns: mount (rotation vector, translation), left arm's zeros, right arm's, pose of the cuff seen."""
 
     def __init__(self, views: Sequence[TagView], camera: Side, info: CameraInfo, zero: float) -> None:
-        super().__init__(views)
+        super().__init__(views, info)
         self._camera: Side = camera
-        self._info = info
-        self._kinematics = Kinematics()
-        self._corners = np.column_stack([tag_corners(), np.ones(4)])
         self._tags = cuff_tags(OTHER[camera])
         self.scale = np.concatenate([np.repeat(MOUNT, 3), np.full(14, zero), np.repeat(CUFF, 3)])
 
@@ -85,9 +82,7 @@ class _HandProblem(ViewProblem):
             self._kinematics.update(q)
             T_base_camera = self._kinematics.pose(hand_name(self._camera)) @ mount
             T = np.linalg.solve(T_base_camera, self._kinematics.pose(hand_name(OTHER[self._camera]))) @ cuff
-            for number, seen in view.corners.items():
-                points = (T @ self._tags[number] @ self._corners.T).T[:, :3]
-                errors.append((project(self._info, points) - seen).ravel())
+            errors += self._errors(view, T, self._tags)
         return np.concatenate(errors)
 
 

@@ -10,7 +10,7 @@ zero plays no part.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,6 +20,7 @@ from scipy.spatial.transform import Rotation
 from golem.errors import ConfigError
 from golem.robots.model.magpie_model import cuff_tags, hand_name, tag_corners
 from golem.robots.model.pinocchio_model import Kinematics
+from golem.robots.model.spatial import transform
 from golem.robots.model.table import T_TORSO_HEAD_OPTICAL
 from golem.robots.sensors.calibration import Calibration
 from golem.robots.sensors.cameras import HEAD, project
@@ -100,12 +101,18 @@ class ViewProblem(ABC):
 
     scale: Array
 
-    def __init__(self, views: Sequence[TagView]) -> None:
-        self.views = list(views)
+    def __init__(self, views: Sequence[TagView], info: CameraInfo) -> None:
+        self.views, self._info, self._kinematics = list(views), info, Kinematics()
+        self._corners = np.column_stack([tag_corners(), np.ones(4)])
 
     @abstractmethod
     def pixels(self, x: Array) -> Array:
         """Return predicted minus seen corners [px]."""
+
+    def _errors(self, view: TagView, T_camera_hand: Array, tags: Mapping[int, Array]) -> list[Array]:
+        """Return the same of the tags of one view, on a hand at `T_camera_hand` (4, 4)."""
+        seen_at = ((T_camera_hand @ tags[number] @ self._corners.T).T[:, :3] for number in view.corners)
+        return [(project(self._info, p) - c).ravel() for p, c in zip(seen_at, view.corners.values(), strict=True)]
 
     @property
     def size(self) -> int:
@@ -160,10 +167,7 @@ class _Problem(ViewProblem):
     """The unknowns: mount (rotation vector, translation), left arm's zeros, right arm's, left cuff's pose, right's."""
 
     def __init__(self, views: Sequence[TagView], info: CameraInfo) -> None:
-        super().__init__(views)
-        self._info = info
-        self._kinematics = Kinematics()
-        self._corners = np.column_stack([tag_corners(), np.ones(4)])
+        super().__init__(views, info)
         self._tags = {side: cuff_tags(side) for side in SIDES}
         mount = np.repeat(MOUNT, 3)
         cuff = np.repeat(CUFF, 3)
@@ -181,15 +185,10 @@ class _Problem(ViewProblem):
             T_base_torso = self._kinematics.pose("torso_link")
             T_base_hand = self._kinematics.pose(hand_name(view.side))
             T = T_optical_torso @ np.linalg.solve(T_base_torso, T_base_hand) @ pose(x[20 + 6 * k : 26 + 6 * k])
-            for number, seen in view.corners.items():
-                points = (T @ self._tags[view.side][number] @ self._corners.T).T[:, :3]
-                errors.append((project(self._info, points) - seen).ravel())
+            errors += self._errors(view, T, self._tags[view.side])
         return np.concatenate(errors)
 
 
 def pose(x: Array) -> Array:
     """Return the (4, 4) pose with rotation vector and translation `x` (6,)."""
-    T = np.eye(4)
-    T[:3, :3] = Rotation.from_rotvec(x[:3]).as_matrix()
-    T[:3, 3] = x[3:]
-    return T
+    return transform(x[3:], Rotation.from_rotvec(x[:3]).as_matrix())

@@ -15,6 +15,7 @@ from golem.capabilities.collision.obstacles import World
 from golem.capabilities.collision.sphere_robot import SphereRobot, sphere_columns
 from golem.errors import ConfigError, unknown_name
 from golem.robots.model.link_geometry import joint_pose
+from golem.robots.model.spatial import transform
 from golem.types import Array
 
 CLUSTER = 6
@@ -142,9 +143,7 @@ class CollisionModel:
                 T_body_link[i] = T_above @ joint_pose(link, joint_value(link, held))
                 continue
             j = column[link.joint]
-            T_link_axis = np.eye(4)
-            T_link_axis[:3, :3] = _frame_along(link.axis)
-            T_link_axis[:3, 3] = link.anchor
+            T_link_axis = transform(link.anchor, _frame_along(link.axis))
             T = T_above @ link.T_parent_link @ T_link_axis
             parents[j], slides[j] = above, link.kind == "slide"
             chain[j, :9], chain[j, 9:] = T[:3, :3].ravel(), T[:3, 3]

@@ -10,7 +10,7 @@ alarms.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
 from typing import Literal, TypeVar
@@ -26,7 +26,7 @@ from golem.capabilities.collision import link_poses
 from golem.capabilities.collision.link_poses import free_links, hold_joints, joint_names, neighbours
 from golem.capabilities.collision.packing_report import CollisionScore, LinkCoverage, coverage, score_collisions
 from golem.capabilities.collision.sphere_packer import Packing, SphereKind, pack
-from golem.capabilities.collision.sphere_robot import SphereRobot, save_spheres, without_surfaces
+from golem.capabilities.collision.sphere_robot import SphereRobot, save_spheres
 from golem.capabilities.collision.surface import link_surface, open_edges
 from golem.errors import ConfigError
 from golem.robots.model.link_geometry import LinkGeometry, h12_geometry, read_geometry
@@ -238,7 +238,8 @@ def pack_robot(name: str, links: tuple[LinkGeometry, ...], config: SpheresConfig
     if config.kind == "tight":
         packings, ignored = packed_as("tight"), np.zeros((0, 2), np.int64)
         allowed = np.zeros(len(allowed))
-    robot = SphereRobot(name, config.kind, without_surfaces(links), packings, table.pairs, allowed, ignored)
+    tree = tuple(replace(link, parts=()) for link in links)
+    robot = SphereRobot(name, config.kind, tree, packings, table.pairs, allowed, ignored)
     report = [
         coverage(links[i].name, link_surface(links[i].name, links[i].parts, config.seed + 1), packings[i])
         for i in solid

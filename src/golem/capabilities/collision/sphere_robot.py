@@ -145,11 +145,6 @@ def holding(robot: SphereRobot, hand: str, held: Packing, name: str = "held") ->
     )
 
 
-def without_surfaces(links: tuple[LinkGeometry, ...]) -> tuple[LinkGeometry, ...]:
-    """Return the links as a bare tree."""
-    return tuple(replace(link, parts=()) for link in links)
-
-
 def sphere_columns(robot: SphereRobot) -> tuple[NDArray[np.int64], Array, Array]:
     """Return (n,) link, (n, 3) centre in the link [m] and (n,) radius [m] of every sphere."""
     link = np.repeat(np.arange(len(robot.links)), [len(p.radii) for p in robot.packings])

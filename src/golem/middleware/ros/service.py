@@ -78,7 +78,11 @@ class Client:
         future: Future[Any] = Future(lambda: self._forget(number))
         servers = frozenset(self._writer.readers().values()) if self._inbox.matched() else frozenset[bytes]()
         if all(server.startswith(FAST_DDS) for server in servers):
-            future.fail(RosError(_alien(self.name) if servers else f"No server of '{self.name}' is there."))
+            alien = (
+                f"The server of '{self.name}' speaks Fast DDS, which we cannot call: "
+                "start it with RMW_IMPLEMENTATION=rmw_cyclonedds_cpp."
+            )
+            future.fail(RosError(alien if servers else f"No server of '{self.name}' is there."))
             return future
         if len(self._pending) >= MAX_PENDING:
             next(iter(self._pending.values())).cancel(f"'{self.name}' left {MAX_PENDING} newer requests unanswered.")
@@ -194,7 +198,10 @@ class Responder:
             self._receive(sample, False)
         elif self._linked is None and not self._warned:
             self._warned = True
-            self._endpoints.guard.log(_deaf(self.name))
+            self._endpoints.guard.log(
+                f"A client of Fast DDS calls '{self.name}' and gets no answer: on this machine we cannot speak to it. "
+                "Start it with RMW_IMPLEMENTATION=rmw_cyclonedds_cpp."
+            )
 
     def _receive(self, sample: Sample, linked: bool) -> None:
         try:
@@ -236,17 +243,3 @@ class Service:
         if isinstance(getattr(response, "message", None), str):
             response.message = reason
         return response
-
-
-def _alien(name: str) -> str:
-    return (
-        f"The server of '{name}' speaks Fast DDS, which we cannot call: "
-        "start it with RMW_IMPLEMENTATION=rmw_cyclonedds_cpp."
-    )
-
-
-def _deaf(name: str) -> str:
-    return (
-        f"A client of Fast DDS calls '{name}' and gets no answer: on this machine we cannot speak to it. "
-        "Start it with RMW_IMPLEMENTATION=rmw_cyclonedds_cpp."
-    )

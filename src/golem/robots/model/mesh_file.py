@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from golem.errors import ConfigError
+from golem.robots.model.spatial import transform
 from golem.types import Array
 
 if TYPE_CHECKING:
@@ -185,7 +186,4 @@ def pose_matrix(position: Array, quaternion: Array) -> Array:
     """Return the (4, 4) pose with `position` (3,) and `quaternion` (4,) wxyz."""
     rotation = np.empty(9)
     mujoco.mju_quat2Mat(rotation, quaternion)
-    T = np.eye(4)
-    T[:3, :3] = rotation.reshape(3, 3)
-    T[:3, 3] = position
-    return T
+    return transform(position, rotation.reshape(3, 3))

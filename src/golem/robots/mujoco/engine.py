@@ -106,7 +106,8 @@ class MujocoRobot:
         self._lidar: LidarSensor | None = None
 
         self._hands = {side: HandServos(model, side, memory[side]) for side in SIDES}
-        self._acc = _sensor(model, "imu_acc")
+        sensor = model.sensor("imu_acc")
+        self._acc = slice(int(sensor.adr[0]), int(sensor.adr[0] + sensor.dim[0]))
 
         mujoco.mj_resetData(model, self.data)
         self._base, self._torso = model.joint("base"), model.joint("torso_joint")
@@ -330,8 +331,3 @@ def _hanging(posture: Array) -> Array:
 def standing_height(posture: Array) -> float:
     """Return the height of base_link [m], upright, with the lower sole on the floor; `posture` is (27,) [rad]."""
     return -float(sole_centers(*leg_poses(posture[LEGS]))[:, 2].min())
-
-
-def _sensor(model: mujoco.MjModel, name: str) -> slice:
-    sensor = model.sensor(name)
-    return slice(int(sensor.adr[0]), int(sensor.adr[0] + sensor.dim[0]))

@@ -11,11 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from golem.errors import ConfigError, OutputError
+from golem.errors import ConfigError
 from golem.interfaces import public
 from golem.interfaces import ros_convert as convert
 from golem.interfaces.lidar import LidarImu, LidarScan
 from golem.middleware.ros.msgs.tf2_msgs import TFMessage
+from golem.output_file import write_file
 from golem.robots.model.spatial import skew
 from golem.robots.model.table import JOINT_INDEX, JOINT_NAMES
 from golem.types import NUM_JOINTS, SIDES, Array
@@ -154,11 +155,7 @@ class Calibration:
         }
         if self.lidar is not None:
             rows["lidar"] = {"pose": self.lidar.pose.tolist(), "covariance": self.lidar.covariance.tolist()}
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
-        except OSError as error:
-            raise OutputError(f"The calibration '{path}' cannot be written: {error}.") from error
+        write_file(path, json.dumps(rows, indent=1) + "\n")
 
 
 def read_calibration(path: Path) -> Calibration:

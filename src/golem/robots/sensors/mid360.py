@@ -18,6 +18,7 @@ from golem.errors import unknown_name
 from golem.kernels import njit
 from golem.options import fill
 from golem.package_data import load_data
+from golem.robots.model.spatial import transform
 from golem.robots.sensors.imu import ImuErrors
 from golem.robots.sensors.streams import stream
 from golem.types import Array
@@ -69,10 +70,8 @@ class LidarErrors:
 
     def draw_mount(self, rng: np.random.Generator) -> Array:
         """Return the (4, 4) pose of the real lidar_link in the one that the robot's model has."""
-        T = np.eye(4)
-        T[:3, :3] = Rotation.from_rotvec(self.mount_rotation * rng.standard_normal(3)).as_matrix()
-        T[:3, 3] = self.mount_translation * rng.standard_normal(3)
-        return T
+        R = Rotation.from_rotvec(self.mount_rotation * rng.standard_normal(3)).as_matrix()
+        return transform(self.mount_translation * rng.standard_normal(3), R)
 
 
 LIDAR_PROFILES: dict[str, LidarErrors] = {

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from golem.errors import ConfigError, unknown_name
 from golem.options import check_values, convert_all, fill, read_yaml
 from golem.package_data import load_data
+from golem.robots.model.spatial import transform
 from golem.robots.model.table import JOINT_INDEX
 from golem.robots.sensors.cameras import CAMERAS
 from golem.robots.sensors.depth import DepthErrors
@@ -283,9 +284,8 @@ def _draw_extrinsic(errors: ExtrinsicErrors, rng: np.random.Generator) -> Array:
     ahead = np.array([0.0, 0.0, errors.reference])
     while True:
         angle = errors.rotation * (1 + 0.2 * rng.standard_normal())
-        T = np.eye(4)
-        T[:3, :3] = Rotation.from_rotvec(angle * _direction(rng)).as_matrix()
-        T[:3, 3] = rng.uniform(*errors.translation) * _direction(rng)
+        R = Rotation.from_rotvec(angle * _direction(rng)).as_matrix()
+        T = transform(rng.uniform(*errors.translation) * _direction(rng), R)
         if np.linalg.norm(T[:3, :3] @ ahead + T[:3, 3] - ahead) >= errors.min_error:
             return T
 

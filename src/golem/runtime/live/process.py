@@ -26,7 +26,7 @@ from golem.runtime.live.stack_process import StackProcess
 from golem.runtime.live.twin import Twin
 from golem.runtime.lockstep import build_robot
 from golem.runtime.node_groups import POOLED
-from golem.stack import Stack, load_stack
+from golem.stack import load_stack
 
 LARGE = 1 << 16
 """Size from which a block of memory is mapped by itself [bytes]: an image's arrays, and clouds."""
@@ -74,14 +74,6 @@ class UpConfig:
     dds: OmitArgPrefixes[DdsConfig] = field(default_factory=DdsConfig)
 
 
-def twin_stack(config: TwinConfig) -> Stack:
-    """Return the stack whose robot the twin is. Raises ConfigError: the stack file is wrong."""
-    stack = load_stack(config.stack, profile=config.profile)
-    if config.world is not None:
-        stack = stack.with_options("robot", world=config.world)
-    return stack
-
-
 def run_twin(config: TwinConfig) -> None:
     """Simulate until Ctrl-C.
 
@@ -91,7 +83,9 @@ def run_twin(config: TwinConfig) -> None:
     """
     if config.dds.robot or config.dds.domain == ROBOT_DOMAIN:
         raise ConfigError(f"A twin never joins domain {ROBOT_DOMAIN}, which is the real robot's; choose another.")
-    stack = twin_stack(config)
+    stack = load_stack(config.stack, profile=config.profile)
+    if config.world is not None:
+        stack = stack.with_options("robot", world=config.world)
     with interrupted() as stop, closing(AsyncLogger()) as tell, member("twin", config.dds, tell) as (participant, node):
         refuse_second(participant, config.dds, "/lowstate", "/clock")
         with closing(build_robot(stack, config.seed)) as robot, ExitStack() as closing_time:

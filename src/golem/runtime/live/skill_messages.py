@@ -55,11 +55,6 @@ def _run_goal(message: golem_interfaces.RunSkill_Goal) -> tuple[str, Fields]:
     return message.skill, cast(Fields, fields)
 
 
-def _pick_goal(message: golem_interfaces.Pick_Goal) -> tuple[str, Fields]:
-    rest = {"side": message.side, "avoid": message.avoid.tolist()}
-    return "pick", {"label": message.label, "container": message.container, **rest}
-
-
 def _walk_goal(message: golem_interfaces.Walk_Goal, skill: str = "walk") -> tuple[str, Fields]:
     T, timeout = convert.matrix(message.pose.pose), convert.seconds(message.timeout)
     yaw = math.atan2(T[1, 0], T[0, 0])
@@ -69,7 +64,10 @@ def _walk_goal(message: golem_interfaces.Walk_Goal, skill: str = "walk") -> tupl
 
 GOALS: dict[str, Callable[[Any], tuple[str, Fields]]] = {
     RUN: _run_goal,
-    "/skill/pick": _pick_goal,
+    "/skill/pick": lambda message: (
+        "pick",
+        {"label": message.label, "container": message.container, "side": message.side, "avoid": message.avoid.tolist()},
+    ),
     "/skill/walk": _walk_goal,
     "/skill/navigate": partial(_walk_goal, skill="navigate"),
     "/skill/stand": lambda message: ("stand", {"seconds": convert.seconds(message.duration)}),
