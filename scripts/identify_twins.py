@@ -16,10 +16,10 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from golem.capabilities.identification import regressor as r
-from golem.capabilities.identification.fit import Identified, identify
-from golem.capabilities.identification.recording import read_motion
+from golem.evaluation.identification import regressor as r
+from golem.evaluation.identification.fit import Identified, identify
 from golem.evaluation.identification.identify_command import halves, record_motion, save, tracking_error
+from golem.evaluation.identification.recording import read_motion
 from golem.robots.model.table import JOINT_NAMES
 from golem.stack import load_stack
 from golem.types import NUM_JOINTS, TICK

@@ -17,10 +17,12 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 
-from golem.capabilities.collision.link_poses import free_links, joint_value, link_poses
 from golem.errors import GolemError
-from golem.robots.model.link_geometry import RobotGeometry, read_geometry
-from golem.robots.model.mesh_file import package_folders, pose_matrix
+from golem.evaluation.spheres.link_poses import link_poses
+from golem.evaluation.spheres.mesh_file import package_folders
+from golem.evaluation.spheres.robot_geometry import RobotGeometry, read_geometry
+from golem.robots.model.geom_mesh import pose_matrix
+from golem.robots.model.link_geometry import free_links, joint_value
 from golem.types import Array
 
 SAME = 1e-9

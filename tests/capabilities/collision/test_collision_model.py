@@ -11,11 +11,10 @@ import pytest
 from golem.capabilities.arms.postures import posture
 from golem.capabilities.collision.collision_model import CollisionModel
 from golem.capabilities.collision.obstacles import Obstacle, World, cloud_grid
-from golem.capabilities.collision.pack_robot import sample_postures
-from golem.capabilities.collision.packing_report import spheres_collide
-from golem.capabilities.collision.sphere_packer import Packing
-from golem.capabilities.collision.sphere_robot import SphereRobot, holding, load_spheres
+from golem.capabilities.collision.sphere_robot import Packing, SphereRobot, holding, load_spheres
 from golem.errors import ConfigError
+from golem.evaluation.spheres.pack_robot import sample_postures
+from golem.evaluation.spheres.packing_report import spheres_collide
 from golem.robots.model.pinocchio_model import Kinematics
 from golem.robots.model.table import JOINT_NAMES
 from golem.types import NUM_JOINTS, UPPER, Array

@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 from scipy.cluster.vq import kmeans2
 
 from golem.capabilities.collision import sphere_kernel, world_kernel
-from golem.capabilities.collision.link_poses import joint_names, joint_value
 from golem.capabilities.collision.obstacles import World
 from golem.capabilities.collision.sphere_robot import SphereRobot, sphere_columns
 from golem.errors import ConfigError, unknown_name
-from golem.robots.model.link_geometry import joint_pose
+from golem.robots.model.link_geometry import joint_names, joint_pose, joint_value
 from golem.robots.model.spatial import transform
 from golem.types import Array
 

@@ -6,18 +6,37 @@ import functools
 import json
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from golem.capabilities.collision.sphere_packer import SPHERE_KINDS, Packing, SphereKind
 from golem.errors import ConfigError, unknown_name
 from golem.robots.model.link_geometry import LinkGeometry
 from golem.types import Array
 
+SphereKind = Literal["tight", "conservative"]
+SPHERE_KINDS: tuple[SphereKind, ...] = ("tight", "conservative")
 FORMAT = "golem-spheres-1"
 H12_SPHERES = Path(__file__).with_name("h12_spheres.json")
 """The conservative set of the H1-2 with MAGPIE hands, its fingers open; `golem model spheres` makes it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Packing:
+    """Spheres of one link: centres (n, 3) and radii (n,) in its frame [m]."""
+
+    centres: Array
+    radii: Array
+
+    def gap(self, points: Array) -> Array:
+        """Return g (n,) of points (n, 3) [m]: positive outside every sphere."""
+        return np.concatenate(
+            [
+                (np.linalg.norm(p[:, None] - self.centres, axis=2) - self.radii).min(axis=1)
+                for p in np.array_split(points, max(1, len(points) // 4000))
+            ]
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from golem.capabilities.collision import sphere_kernel
 from golem.capabilities.collision.collision_model import CollisionModel
 from golem.capabilities.collision.obstacles import World
-from golem.capabilities.collision.sphere_packer import Packing
-from golem.capabilities.collision.sphere_robot import SphereRobot, holding, shipped_spheres
+from golem.capabilities.collision.sphere_robot import Packing, SphereRobot, holding, shipped_spheres
 from golem.capabilities.planning import plan_kernel
 from golem.capabilities.planning.base import Held
 from golem.capabilities.planning.plan_kernel import FREE, ITSELF, RANGE, RULE, WORLD, Space

@@ -11,11 +11,11 @@ import numpy as np
 import yaml
 from tyro.conf import Positional
 
-from golem.capabilities.identification import regressor as r
-from golem.capabilities.identification.fit import Identified, identify, low_passed
-from golem.capabilities.identification.recording import COMMAND, STATE, RecordedMotion, read_motion
-from golem.capabilities.identification.regressor import NOMINAL, PAYLOAD
 from golem.errors import ConfigError
+from golem.evaluation.identification import regressor as r
+from golem.evaluation.identification.fit import Identified, identify, low_passed
+from golem.evaluation.identification.recording import COMMAND, STATE, RecordedMotion, read_motion
+from golem.evaluation.identification.regressor import NOMINAL, PAYLOAD
 from golem.interfaces.recorded import public_topics
 from golem.middleware.bags.writer import BagWriter
 from golem.output_file import write_file

@@ -16,9 +16,7 @@ from golem.capabilities.arms.goal_postures import GoalPostures
 from golem.capabilities.arms.postures import downward, posture
 from golem.capabilities.arms.trajectory import gate_limits, interpolate
 from golem.capabilities.collision.collision_model import CollisionModel
-from golem.capabilities.collision.link_poses import MeshOracle, joint_names
 from golem.capabilities.collision.obstacles import Obstacle, World
-from golem.capabilities.collision.pack_robot import our_robot
 from golem.capabilities.collision.sphere_robot import load_spheres
 from golem.capabilities.planning.base import ArmPlanner, Held, Plan, PlanRefused, PlanRequest
 from golem.capabilities.planning.joint_space import JointSpace, PlanningRobot
@@ -28,6 +26,9 @@ from golem.capabilities.planning.rules import HandUpright, Rule
 from golem.errors import ConfigError
 from golem.evaluation.metrics.statistics import wilson
 from golem.evaluation.speed.bench import BenchOutput, Figure, figure, print_figures, timed
+from golem.evaluation.spheres.link_poses import MeshOracle
+from golem.evaluation.spheres.pack_robot import our_robot
+from golem.robots.model.link_geometry import joint_names
 from golem.robots.model.table import JOINT_NAMES
 from golem.robots.worlds.conditions import arranged, draw_conditions
 from golem.robots.worlds.layout import PackLayout

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from trimesh.visual.material import PBRMaterial
 from trimesh.visual.texture import TextureVisuals
 
-from golem.robots.model.mesh_file import geom_mesh, pose_matrix
+from golem.robots.model.geom_mesh import geom_mesh, pose_matrix
 from golem.robots.mujoco.camera import SHOWN_GROUPS
 
 SMOOTH = np.radians(35.0)

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from golem.capabilities.identification import regressor as r
-from golem.capabilities.identification.fit import find_delay, identify
-from golem.capabilities.identification.recording import IdentificationError, RecordedMotion
 from golem.capabilities.identification.sweep import MIDDLE, swing
+from golem.evaluation.identification import regressor as r
+from golem.evaluation.identification.fit import find_delay, identify
 from golem.evaluation.identification.identify_command import simulate
+from golem.evaluation.identification.recording import IdentificationError, RecordedMotion
 from golem.hardware.servo.gains import default_gains
 from golem.robots.model.imu_mount import TORSO
 from golem.robots.model.table import load_limits

@@ -13,9 +13,9 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 from scipy.signal import butter, sosfiltfilt
 
-from golem.capabilities.identification import regressor as r
-from golem.capabilities.identification.recording import IdentificationError, RecordedMotion
-from golem.capabilities.identification.regressor import HangingTree
+from golem.evaluation.identification import regressor as r
+from golem.evaluation.identification.recording import IdentificationError, RecordedMotion
+from golem.evaluation.identification.regressor import HangingTree
 from golem.robots.model.table import JOINT_NAMES, load_limits
 from golem.types import NUM_JOINTS, TICK, Array
 

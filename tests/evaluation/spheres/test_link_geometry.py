@@ -8,9 +8,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from golem.capabilities.collision.link_poses import joint_names, link_poses
 from golem.errors import ConfigError
-from golem.robots.model.link_geometry import h12_geometry, read_geometry
+from golem.evaluation.spheres.link_poses import link_poses
+from golem.evaluation.spheres.robot_geometry import h12_geometry, read_geometry
+from golem.robots.model.link_geometry import joint_names
 from golem.robots.model.table import JOINT_NAMES
 
 ARM = """

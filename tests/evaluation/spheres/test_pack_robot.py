@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from golem.capabilities.collision.collision_model import CollisionModel
-from golem.capabilities.collision.link_poses import hold_joints, joint_names, link_poses
-from golem.capabilities.collision.pack_robot import SpheresConfig, run_spheres
-from golem.capabilities.collision.packing_report import spheres_collide
 from golem.capabilities.collision.sphere_robot import load_spheres, sphere_columns
 from golem.errors import ConfigError
-from golem.robots.model.link_geometry import read_geometry
+from golem.evaluation.spheres.link_poses import hold_joints, link_poses
+from golem.evaluation.spheres.pack_robot import SpheresConfig, run_spheres
+from golem.evaluation.spheres.packing_report import spheres_collide
+from golem.evaluation.spheres.robot_geometry import read_geometry
+from golem.robots.model.link_geometry import joint_names
 
 TWO_ARMS = """
 <mujoco>

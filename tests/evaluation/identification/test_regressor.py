@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from golem.capabilities.identification import regressor as r
+from golem.evaluation.identification import regressor as r
 from golem.evaluation.identification.identify_command import body_spec
 from golem.robots.model.imu_mount import TORSO
 from golem.robots.model.table import JOINT_NAMES

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from golem.errors import unknown_name
-from golem.robots.model.link_geometry import LinkGeometry, joint_pose
+from golem.robots.model.link_geometry import LinkGeometry, joint_names, joint_pose, joint_value
 from golem.types import Array
 
 
@@ -74,21 +74,6 @@ def _ball(link: LinkGeometry) -> tuple[Array, float]:
     vertices = np.concatenate([p.vertices for p in link.parts])
     centre = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
     return centre, float(np.linalg.norm(vertices - centre, axis=1).max())
-
-
-def free_links(links: Sequence[LinkGeometry]) -> list[LinkGeometry]:
-    """Return the links whose joints move and follow no other, in order."""
-    return [link for link in links if link.kind != "fixed" and not link.leader]
-
-
-def joint_names(links: Sequence[LinkGeometry]) -> list[str]:
-    """Return the names of the joints that move by themselves, in the order of the links."""
-    return [link.joint for link in free_links(links)]
-
-
-def joint_value(link: LinkGeometry, q: Mapping[str, float]) -> float:
-    """Return the position of a link's joint [rad or m] where the free joints are at `q`; those not named are at 0."""
-    return link.ratio * q.get(link.leader, 0.0) + link.offset if link.leader else q.get(link.joint, 0.0)
 
 
 def link_poses(links: Sequence[LinkGeometry], q: Array) -> Array:

@@ -9,17 +9,13 @@ descends the mean of g squared.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
-
 import numpy as np
 from numpy.typing import NDArray
 
-from golem.capabilities.collision.surface import DENSITY, LinkSurface, spread
+from golem.capabilities.collision.sphere_robot import Packing, SphereKind
+from golem.evaluation.spheres.surface import DENSITY, LinkSurface, spread
 from golem.types import Array
 
-SphereKind = Literal["tight", "conservative"]
-SPHERE_KINDS: tuple[SphereKind, ...] = ("tight", "conservative")
 GAP_WEIGHT: dict[SphereKind, float] = {"tight": 1.0, "conservative": 10.0}
 """What a gap counts in the descent against standing out as far."""
 CANDIDATES = 2400
@@ -29,23 +25,6 @@ SMALLEST = 0.002
 BETWEEN = 5e-4
 """Added to the radii of a conservative set, for what lies between the samples [m]."""
 ITERATIONS = 80
-
-
-@dataclass(frozen=True, slots=True)
-class Packing:
-    """Spheres of one link: centres (n, 3) and radii (n,) in its frame [m]."""
-
-    centres: Array
-    radii: Array
-
-    def gap(self, points: Array) -> Array:
-        """Return g (n,) of points (n, 3) [m]: positive outside every sphere."""
-        return np.concatenate(
-            [
-                (np.linalg.norm(p[:, None] - self.centres, axis=2) - self.radii).min(axis=1)
-                for p in np.array_split(points, max(1, len(points) // 4000))
-            ]
-        )
 
 
 def pack(surface: LinkSurface, kind: SphereKind, tolerance: float, most: int, seed: int = 0) -> Packing:

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from golem.capabilities.identification import recording
-from golem.capabilities.identification.recording import COMMAND, STATE, IdentificationError, read_motion
+from golem.evaluation.identification import recording
+from golem.evaluation.identification.recording import COMMAND, STATE, IdentificationError, read_motion
 from golem.interfaces.recorded import public_topics
 from golem.middleware.bags.base import BagMessage
 from golem.middleware.bags.writer import BagWriter

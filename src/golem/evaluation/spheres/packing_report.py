@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from golem.capabilities.collision.link_poses import MeshOracle, link_poses
-from golem.capabilities.collision.sphere_packer import Packing
-from golem.capabilities.collision.sphere_robot import SphereRobot, sphere_columns
-from golem.capabilities.collision.surface import LinkSurface
+from golem.capabilities.collision.sphere_robot import Packing, SphereRobot, sphere_columns
+from golem.evaluation.spheres.link_poses import MeshOracle, link_poses
+from golem.evaluation.spheres.surface import LinkSurface
 from golem.robots.model.link_geometry import LinkGeometry
 from golem.types import Array
 

@@ -22,16 +22,17 @@ from rich.console import Console
 from rich.table import Table
 from tqdm import tqdm
 
-from golem.capabilities.collision import link_poses
-from golem.capabilities.collision.link_poses import free_links, hold_joints, joint_names, neighbours
-from golem.capabilities.collision.packing_report import CollisionScore, LinkCoverage, coverage, score_collisions
-from golem.capabilities.collision.sphere_packer import Packing, SphereKind, pack
-from golem.capabilities.collision.sphere_robot import SphereRobot, save_spheres
-from golem.capabilities.collision.surface import link_surface, open_edges
+from golem.capabilities.collision.sphere_robot import Packing, SphereKind, SphereRobot, save_spheres
 from golem.errors import ConfigError
-from golem.robots.model.link_geometry import LinkGeometry, h12_geometry, read_geometry
+from golem.evaluation.spheres import link_poses
+from golem.evaluation.spheres.link_poses import hold_joints, neighbours
+from golem.evaluation.spheres.mesh_file import package_folders
+from golem.evaluation.spheres.packing_report import CollisionScore, LinkCoverage, coverage, score_collisions
+from golem.evaluation.spheres.robot_geometry import h12_geometry, read_geometry
+from golem.evaluation.spheres.sphere_packer import pack
+from golem.evaluation.spheres.surface import link_surface, open_edges
+from golem.robots.model.link_geometry import LinkGeometry, free_links, joint_names
 from golem.robots.model.magpie_model import FINGERS, finger_names
-from golem.robots.model.mesh_file import package_folders
 from golem.robots.model.table import JOINT_NAMES
 from golem.types import LEGS, SIDES, Array
 

@@ -10,10 +10,11 @@ import pytest
 import trimesh
 from tests.robots.model.collada import collada
 
-from golem.capabilities.collision.link_poses import hold_joints, joint_names, link_poses
 from golem.errors import ConfigError
-from golem.robots.model.link_geometry import RobotGeometry, read_geometry
-from golem.robots.model.mesh_file import find_mesh, package_folders, read_mesh
+from golem.evaluation.spheres.link_poses import hold_joints, link_poses
+from golem.evaluation.spheres.mesh_file import find_mesh, package_folders, read_mesh
+from golem.evaluation.spheres.robot_geometry import RobotGeometry, read_geometry
+from golem.robots.model.link_geometry import joint_names
 
 BOX = '<geometry><box size="0.1 0.2 0.3"/></geometry>'
 SHAPE = f"<collision>{BOX}</collision>"

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 import trimesh
 
-from golem.capabilities.collision.packing_report import coverage
-from golem.capabilities.collision.sphere_packer import SphereKind, pack
-from golem.capabilities.collision.surface import LinkSurface, link_surface, open_edges
+from golem.capabilities.collision.sphere_robot import SphereKind
 from golem.errors import ConfigError
+from golem.evaluation.spheres.packing_report import coverage
+from golem.evaluation.spheres.sphere_packer import pack
+from golem.evaluation.spheres.surface import LinkSurface, link_surface, open_edges
 from golem.robots.model.link_geometry import SurfacePart
 
 

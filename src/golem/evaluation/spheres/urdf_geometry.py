@@ -16,9 +16,11 @@ from scipy.spatial.transform import Rotation
 from tqdm import tqdm
 
 from golem.errors import ConfigError
-from golem.robots.model import link_geometry
-from golem.robots.model.link_geometry import GeometryChoice, JointKind, LinkGeometry, RobotGeometry, SurfacePart
-from golem.robots.model.mesh_file import find_mesh, primitive, read_mesh
+from golem.evaluation.spheres import robot_geometry
+from golem.evaluation.spheres.mesh_file import find_mesh, read_mesh
+from golem.evaluation.spheres.robot_geometry import GeometryChoice, RobotGeometry
+from golem.robots.model.geom_mesh import primitive
+from golem.robots.model.link_geometry import JointKind, LinkGeometry, SurfacePart
 from golem.robots.model.spatial import rotation_rpy, transform
 from golem.types import Array
 
@@ -197,12 +199,12 @@ def read_urdf(root: ET.Element, file: Path, choice: GeometryChoice, packages: Ma
             chain = [base] if floats else reader.joint(element)  # the free root of a robot that goes about
             waiting.append((child, here, chain or [base]))
     bar.close()
-    links, wrong = link_geometry.led(links)
+    links, wrong = robot_geometry.led(links)
     findings += wrong
     if findings:
         more = f"; and {len(findings) - NAMED} more" if len(findings) > NAMED else ""
         raise ConfigError(f"'{file}' cannot be read as a robot: {'; '.join(findings[:NAMED])}{more}.")
-    return link_geometry.with_surface(RobotGeometry(file.stem, tuple(links)))
+    return robot_geometry.with_surface(RobotGeometry(file.stem, tuple(links)))
 
 
 def _link(joint: ET.Element, end: str) -> str:
