@@ -21,8 +21,8 @@ from golem.errors import GolemError
 from golem.evaluation.spheres.link_poses import link_poses
 from golem.evaluation.spheres.mesh_file import package_folders
 from golem.evaluation.spheres.robot_geometry import RobotGeometry, read_geometry
-from golem.robots.model.geom_mesh import pose_matrix
 from golem.robots.model.link_geometry import free_links, joint_value
+from golem.robots.mujoco.geom_mesh import pose_matrix
 from golem.types import Array
 
 SAME = 1e-9

@@ -10,9 +10,9 @@ import pytest
 
 from golem.errors import ConfigError
 from golem.robots.model.magpie_model import hand_name
+from golem.robots.mujoco.auto_exposure import GAIN, LONGER, READ_NOISE, SHOT_NOISE, AutoExposure
 from golem.robots.mujoco.config import MujocoConfig
 from golem.robots.mujoco.scene import build_scene
-from golem.robots.sensors.auto_exposure import GAIN, LONGER, READ_NOISE, SHOT_NOISE, AutoExposure
 from golem.robots.sensors.profiles import load_profile
 from golem.robots.worlds.conditions import (
     NAMES,

@@ -14,8 +14,8 @@ import numpy as np
 
 from golem.errors import ConfigError, unknown_name
 from golem.robots.model import mjcf
-from golem.robots.model.geom_mesh import geom_mesh, pose_matrix
 from golem.robots.model.link_geometry import JointKind, LinkGeometry, SurfacePart, joint_pose
+from golem.robots.mujoco.geom_mesh import geom_mesh, pose_matrix
 from golem.types import Array
 
 GeometryChoice = Literal["visual", "collision"]

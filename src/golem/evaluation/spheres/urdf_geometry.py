@@ -19,9 +19,9 @@ from golem.errors import ConfigError
 from golem.evaluation.spheres import robot_geometry
 from golem.evaluation.spheres.mesh_file import find_mesh, read_mesh
 from golem.evaluation.spheres.robot_geometry import GeometryChoice, RobotGeometry
-from golem.robots.model.geom_mesh import primitive
 from golem.robots.model.link_geometry import JointKind, LinkGeometry, SurfacePart
 from golem.robots.model.spatial import rotation_rpy, transform
+from golem.robots.mujoco.geom_mesh import primitive
 from golem.types import Array
 
 KINDS: dict[str, JointKind] = {"fixed": "fixed", "revolute": "hinge", "continuous": "hinge", "prismatic": "slide"}

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from trimesh.visual.material import PBRMaterial
 from trimesh.visual.texture import TextureVisuals
 
-from golem.robots.model.geom_mesh import geom_mesh, pose_matrix
 from golem.robots.mujoco.camera import SHOWN_GROUPS
+from golem.robots.mujoco.geom_mesh import geom_mesh, pose_matrix
 
 SMOOTH = np.radians(35.0)
 """Edges flatter than this are shaded smooth [rad]."""

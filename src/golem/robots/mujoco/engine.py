@@ -16,6 +16,7 @@ from golem.robots.model.imu_mount import torso_motion
 from golem.robots.model.leg_kinematics import leg_poses, sole_centers
 from golem.robots.model.table import BASE_LINK, load_limits
 from golem.robots.mujoco import twin_stages
+from golem.robots.mujoco.auto_exposure import AutoExposure
 from golem.robots.mujoco.camera import CameraRig
 from golem.robots.mujoco.config import WORKSHOPS, MujocoConfig
 from golem.robots.mujoco.external_forces import Hoist, Pushes
@@ -24,7 +25,6 @@ from golem.robots.mujoco.lidar_sensor import LidarMoment, LidarSensor
 from golem.robots.mujoco.motors import Motors
 from golem.robots.mujoco.scene import COARSE_STEP, FINE_STEP, Scene, build_scene, nominal_layout
 from golem.robots.mujoco.truth import Truth
-from golem.robots.sensors.auto_exposure import AutoExposure
 from golem.robots.sensors.cameras import CAMERAS
 from golem.robots.sensors.depth import StereoDepth
 from golem.robots.sensors.imu import ImuModel

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from tqdm import tqdm
 
-from golem.robots.sensors.auto_exposure import AutoExposure
+from golem.robots.mujoco.auto_exposure import AutoExposure
 from golem.robots.sensors.cameras import CAMERAS
 from golem.robots.sensors.streams import stream
 from golem.robots.worlds.conditions import Conditions, draw_conditions
