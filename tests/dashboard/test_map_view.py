@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from golem.capabilities.navigation.map_picture import FAINT, INK, MapPicture
+from golem.dashboard.map_picture import FAINT, INK, MapPicture
 from golem.dashboard.status import place_words
 from golem.interfaces.memory_payloads import RememberedPlace
 from golem.interfaces.nav_payloads import OccupancyGrid

@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from golem.capabilities.navigation.map_picture import FAINT, INK, ROBOT, SCAN, WAY, MapPicture
 from golem.capabilities.perception.lift import scene_of
+from golem.dashboard.map_picture import FAINT, INK, ROBOT, SCAN, WAY, MapPicture
 from golem.errors import MissingExtra
 from golem.figures import blank_figure, pixels
 from golem.interfaces import topics

@@ -13,8 +13,8 @@ from typing import Any, Literal
 import cv2
 import numpy as np
 
-from golem.capabilities.navigation.map_picture import GOAL, TRACK, WAY, MapPicture
 from golem.capabilities.navigation.movers import BODY
+from golem.dashboard.map_picture import GOAL, TRACK, WAY, MapPicture
 from golem.evaluation.base import DONE, Rung, TrialOutcome, TrialSpec
 from golem.evaluation.episodes.episode import Episode, Loss, episode_seed, legs_stack
 from golem.evaluation.episodes.oracle import ContactWatch
