@@ -47,7 +47,7 @@ def test_the_gate_names_them_while_it_has_no_other_reason() -> None:
     assert live.gate.status.reason is not None and "unknown" not in live.gate.status.detail
     live.run(0.2)
     assert live.gate.status.state is GateState.ARMED
-    assert live.gate.status.detail == f"unknown senders: {strangers[0]}"
+    assert live.gate.status.detail == f"no fault; unknown senders: {strangers[0]}"
     strangers.clear()
     live.run(0.01)
     assert live.gate.status.detail == ""

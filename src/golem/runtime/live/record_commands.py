@@ -127,7 +127,8 @@ def run_record(config: RecordConfig) -> int:
     for name in sorted({*recorder.received, *config.topics}):
         lost = "  more than could be kept; some were lost" if name in recorder.overruns else ""
         print(f"{recorder.received.get(name, 0):9d}  {name}{lost}")
-    nothing = f" Nobody published anything on {config.dds}." if bag.messages == 0 else ""
+    what = "these topics" if config.topics else "anything"
+    nothing = f" Nobody published {what} on {config.dds}." if bag.messages == 0 else ""
     print(f"{bag}.{nothing}", flush=True)
     return bag.messages
 

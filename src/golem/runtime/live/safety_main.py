@@ -58,6 +58,8 @@ def unknown_senders(participant: CycloneParticipant) -> list[str]:
         if not name or writer.participant == participant.guid:
             continue
         who = owner(participant, writer.guid)
+        if who == writer.guid.hex():
+            who = f"participant {writer.guid[:12].hex()}"  # over Fast DDS a process does not tell its name
         if not who.startswith("golem "):
             found.setdefault(who, set()).add(name)
     return [f"{who} ({', '.join(sorted(topics))})" for who, topics in sorted(found.items())]

@@ -231,7 +231,7 @@ class SafetyProcess:
         self._steps += 1
         self.command = result.command
         strangers = "" if result.reason else "; ".join(self._senders())
-        detail = f"unknown senders: {strangers}" if strangers else result.detail
+        detail = f"no fault; unknown senders: {strangers}" if strangers else result.detail
         self.status = status = GateStatus(now, result.state, result.reason, detail)
         if status.stopped and now - self._foreign < FOREIGN:
             # To say "stopped" would be to lie: the motors follow whoever wrote last.

@@ -20,9 +20,9 @@ LAG = CATCH_UP * TICK
 PATIENCE = 1.0
 """How long the robot's time stands still for an answer or an image at most [s] [own: with two cores for three times as
 many busy threads, processes were held up for 0.6 s]."""
-SILENCE = 2.0 * PATIENCE
+SILENCE = 3.0 * PATIENCE
 """Time without a word after which the stack takes the gate, or the robot that it works with, for dead [s]."""
-_AGES = ("state_age", "command_age", "command_late", "base_age", "stall")
+_AGES = ("state_age", "command_age", "command_late", "base_age", "stall", "hung")
 
 
 def relaxed_limits(limits: SafetyLimits) -> SafetyLimits:

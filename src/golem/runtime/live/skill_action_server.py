@@ -96,7 +96,8 @@ class SkillActionServer:
                 f"{self._who(lease.client)} has the lease for skills; end it, or: golem skill --take-over ..."
             )
         if safety.state is not GateState.ACTIVE:
-            raise GolemError(f"The safety gate is {describe_status(safety)}; activate it first: golem safety activate.")
+            remedy = "golem safety reset && golem safety activate" if safety.stopped else "golem safety activate"
+            raise GolemError(f"The safety gate is {describe_status(safety)}; activate it first: {remedy}.")
         return stack
 
     def cancel(self, goal: ServerGoal) -> bool:

@@ -72,7 +72,7 @@ def run_skill(words: list[str]) -> int:
     if not rest:
         raise ConfigError("Say which skill; golem skill --help lists them.")
     with interrupted() as stop, member("skill", config.dds) as (_, node):
-        remedy = f"start a stack with: {config.dds.command('up STACK')}"
+        remedy = f"on {config.dds}, start a stack with: {config.dds.command('up STACK')}"
         goal = compose(node, config, rest, remedy)
         if config.take_over:
             log_line(ask(node, "/skill/take_over", public.TRIGGER, Trigger_Request(), remedy).message)

@@ -244,7 +244,7 @@ class LegStatus(Message):
 
     Attributes:
         header: frame_id "base_link"
-        commanded: the newest velocity command as it came [m/s], [rad/s]; may be not finite
+        commanded: the newest velocity command as it came [m/s], [rad/s]; zero if not finite
         applied: what the controller was given [m/s], [rad/s]
         commanded_height: height of base_link over the ground that was asked for [m]; NaN: the controller's
             own
