@@ -34,6 +34,8 @@ SETTLED = (*FINAL, PickOutcome.JAMMED)
 EXPECTED = (0.03, 0.03, 0.045)
 """How far along x, y, z an object may be from where a palm camera is known to show it [m]: two of a real pack are 34 mm
 apart, or one is 65 mm lower than the other."""
+LEAD = 0.03
+"""Way at first, far above anything, on which a hand that comes down learns the friction of its own arm [m]."""
 SURE = 0.003
 """Uncertainty of the servo's target below which the object was seen [m]."""
 
@@ -282,7 +284,8 @@ class Pick:
         arm, hand = context.arms[attempt.side], context.hands[attempt.side]
         end = context.t + law.patience
         closing, camera, self._seen, droop = False, f"{attempt.side}_hand", None, np.zeros(3)
-        below = await ForceGuard.at_rest(context, attempt.side, arm.commanded[:3, 2], self._config.press_force)
+        down = arm.commanded[:3, 2]
+        below = await ForceGuard.at_rest(context, attempt.side, down, self._config.press_force, lead=LEAD)
         room = FingerRoom(context, attempt.side, gap)
         observer = None
         if isinstance(law, SeeingLaw):
