@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from golem.capabilities.mapping.voxel_grid import VoxelGridMapper
-from golem.capabilities.navigation.map_picture import ROBOT, MapPicture
+from golem.dashboard.map_picture import ROBOT, MapPicture
 from golem.evaluation.episodes.episode import legs_stack
 from golem.interfaces import topics
 from golem.middleware.bus import News
