@@ -173,7 +173,7 @@ def convert(what: str, hint: Any, value: Any) -> Any:
     """
     config = dataclass_in(hint)
     if config is not None and isinstance(value, Mapping):
-        return fill(what if what.startswith("key of ") else f"key of {what}", config, cast(Mapping[str, object], value))
+        return fill(f"key of {what.removeprefix('key of ')}", config, cast(Mapping[str, object], value))
     if config is not None and hint is config and not isinstance(value, config):
         names = ", ".join(f.name for f in dataclasses.fields(config))
         raise ConfigError(f"The {what} is a mapping with keys from {names}; not {shorten(repr(value))}.")

@@ -244,7 +244,7 @@ class TargetChoice:
         view = self._or_listed(context, goal, await self._see(context, goal, _View()))
         blind = view.problem is not None and view.problem.outcome is PickOutcome.FAILED
         if not blind and not self._enough(goal, view) and self._config.turn > 0.0:
-            view = self._or_listed(context, goal, await self._look_around(context, goal, view))
+            view = await self._look_around(context, goal, view)
         if view.problem is not None:
             raise view.problem
         assert view.container is not None  # it would be the problem

@@ -143,12 +143,14 @@ class PickWatch(ErrandWatch):
             self._servoed, self._aim, self._strayed = False, np.array(feedback.data["target"][:2]), 0.0
         self._servoed = self._servoed or feedback.stage == "servo"
         if feedback.stage in LOOKING:
-            # What it looks at is as far from the true hand as it believes it to be from the hand.
-            looked = np.subtract(feedback.data["target"], feedback.data["hand"]) if "hand" in feedback.data else 0.0
+            hand = self._oracle.gripper(self._side)[:3, 3]
             if "hand" in feedback.data:
-                self._strayed = float(np.linalg.norm(feedback.data["target"][:2] - self._aim))
-            if self._attempt not in self.looked_at or "hand" in feedback.data:
-                self.looked_at[self._attempt] = self._oracle.gripper(self._side)[:3, 3] + looked
+                # What it looks at is as far from the true hand as it believes it to be from the hand.
+                target = feedback.data["target"]
+                self.looked_at[self._attempt] = hand + np.subtract(target, feedback.data["hand"])
+                self._strayed = float(np.linalg.norm(target[:2] - self._aim))
+            else:
+                self.looked_at.setdefault(self._attempt, hand)
         if feedback.stage == "grasp" and not feedback.data.get("failed"):
             # Where it servoed, the camera in the palm sent the hand, else that of the head.
             camera = f"{self._side}_hand" if self._servoed else "head"

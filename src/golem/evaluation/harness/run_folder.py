@@ -188,13 +188,10 @@ def finished_records(folder: Path) -> list[TrialRecord]:
         golem.errors.OutputError: a run writes to it, or ended while it wrote, or a line is no trial record.
         ConfigError: it holds no trials.
     """
-    trials = folder / "trials.jsonl"
-    if not folder.is_dir():
-        raise ConfigError(
-            f"{folder} holds no trials: no such folder; give the --out folder of a golem ladder or a golem study."
-        )
+    trials, absent = folder / "trials.jsonl", "" if folder.is_dir() else ": no such folder"
+    none = f"{folder} holds no trials{absent}; give the --out folder of a golem ladder or a golem study."
     if not trials.is_file():
-        raise ConfigError(f"{folder} holds no trials; give the --out folder of a golem ladder or a golem study.")
+        raise ConfigError(none)
     held = os.open(folder, os.O_RDONLY)
     try:
         fcntl.flock(held, fcntl.LOCK_SH | fcntl.LOCK_NB)
@@ -207,7 +204,7 @@ def finished_records(folder: Path) -> list[TrialRecord]:
         raise OutputError(f"The last line of {trials} is half-written; give its command again to continue the run.")
     records = read_records(trials)
     if not records:
-        raise ConfigError(f"{folder} holds no trials; give the --out folder of a golem ladder or a golem study.")
+        raise ConfigError(none)
     if records[0].rung not in RUNGS:
         raise unknown_name(f"rung of {trials}", records[0].rung, RUNGS)
     return records
