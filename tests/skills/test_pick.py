@@ -17,10 +17,11 @@ from golem.errors import ConfigError
 from golem.interfaces import topics
 from golem.interfaces.payloads import DetectionRequest
 from golem.robots.model.magpie_model import MAX_GAP
-from golem.skills.base import SkillResult
+from golem.skills.base import SkillResult, StageFailed
 from golem.skills.pick import Pick, PickConfig, PickGoal, followed
 from golem.skills.pick_targets import called
 from golem.skills.runner import SkillRun
+from golem.skills.travel import LineTravel
 from golem.types import Array, CameraInfo, LocalizedObject, RgbdImage, Side
 
 SCREW = np.array([0.43, -0.14, -0.03])
@@ -118,6 +119,21 @@ def let_go_at(world: Any, **goal: Any) -> Array:
 
 def test_the_screw_is_let_go_above_the_tray_however_much_the_head_camera_is_off(full: Any) -> None:
     np.testing.assert_allclose(let_go_at(full), TRAY + (0.0, 0.0, CONFIG.drop_height), atol=1e-9)
+
+
+def test_what_no_hand_brings_to_the_tray_is_set_back_where_it_was_taken(full: Any, monkeypatch: Any) -> None:
+    carry = LineTravel.carry
+
+    async def refused(self: LineTravel, side: Side, goals: list[Array], speed: float) -> None:
+        if all(np.linalg.norm((T[:3, 3] - TRAY)[:2]) < 0.1 for T in goals):
+            raise StageFailed("place", "upper_body", "No way to there.")
+        await carry(self, side, goals, speed)
+
+    monkeypatch.setattr(LineTravel, "carry", refused)
+    at = let_go_at(full)
+    assert np.linalg.norm((at - SCREW)[:2]) < 0.003
+    assert at[2] - SCREW[2] < 0.02
+    assert_safe(full)
 
 
 def test_a_neighbour_of_the_one_that_is_wanted_is_let_go_above_the_tray_too(full: Any, thing: Any) -> None:

@@ -20,7 +20,7 @@ from golem.skills.force_guard import CLOSED, ForceGuard
 from golem.skills.hand_offset import learn_offset, made_up
 from golem.skills.pack_view import see_fasteners
 from golem.skills.pick_config import PickConfig, PickFailed, PickGoal, PickOutcome, PickReport, Sight, outcome_of
-from golem.skills.pick_place import look_after, place, pull
+from golem.skills.pick_place import LEAD, look_after, place, pull, set_back
 from golem.skills.pick_targets import SAME, Attempt, PickChoice, TargetChoice, called, names_of
 from golem.skills.poses import floor_places, lifted, moved, stands_at
 from golem.skills.stance_choice import stance_here
@@ -34,8 +34,6 @@ SETTLED = (*FINAL, PickOutcome.JAMMED)
 EXPECTED = (0.03, 0.03, 0.045)
 """How far along x, y, z an object may be from where a palm camera is known to show it [m]: two of a real pack are 34 mm
 apart, or one is 65 mm lower than the other."""
-LEAD = 0.03
-"""Way at first, far above anything, on which a hand that comes down learns the friction of its own arm [m]."""
 SURE = 0.003
 """Uncertainty of the servo's target below which the object was seen [m]."""
 
@@ -56,6 +54,7 @@ class Pick:
         self._across: float | None = None
         self._goal, self._off, self._sure = PickGoal(), np.zeros(3), False
         self._seen: Array | None = None
+        self._from: tuple[Array, float] | None = None
 
     def timeout(self, goal: PickGoal) -> float:
         """Return the time it may take [s]; see `Skill`."""
@@ -80,7 +79,7 @@ class Pick:
     async def _pursue(self, context: Context, goal: PickGoal) -> SkillResult:
         """Go through the stages, and home, whether they succeeded or not."""
         timings: dict[str, float] = {"start": context.t}
-        self._report, tried, self._across = PickReport(), list[Attempt](), None
+        self._report, tried, self._across, self._from = PickReport(), list[Attempt](), None, None
         result = SkillResult(True, "done", None, f"The {goal.label} was dropped in the {goal.container}.", timings)
         try:
             await self._travel.begin(self._config.travel_speed)
@@ -94,6 +93,8 @@ class Pick:
             self._note(failure)
             result = SkillResult(False, failure.stage, failure.slot, str(failure), timings)
             for side in _hands(goal, tried):
+                if self._from is not None and context.hands[side].status.holding:
+                    await set_back(context, self._config, self._travel, side, *self._from)
                 context.hands[side].open(self._config.release_gap)
         timings["total"] = context.t - timings.pop("start")
         for side in _hands(goal, tried):
@@ -244,6 +245,7 @@ class Pick:
                 else:
                     await self._servo(context, attempt, law, grasp.gap)
                 timings["detect_to_grasp"] = context.t - timings["start"]
+                self._from = context.arms[attempt.side].commanded, grasp.gap
                 await pull(context, self._config, self._travel, attempt, -grasp.T_odom_gripper[:3, 2], self._heights)
                 return
             except StageFailed as failure:

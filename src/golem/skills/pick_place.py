@@ -17,8 +17,10 @@ from golem.skills.pick_config import PickConfig, PickFailed, PickOutcome, PickRe
 from golem.skills.pick_targets import Attempt, HandReach, PickChoice, positions
 from golem.skills.poses import lifted, moved, turned
 from golem.skills.travel import Travel
-from golem.types import Array
+from golem.types import Array, Side
 
+LEAD = 0.03
+"""Way at first, far above anything, on which a hand that comes down learns the friction of its own arm [m]."""
 DROPS = 6
 """Places in the container that are tried."""
 LOOKS = 3
@@ -114,6 +116,24 @@ async def place(
         raise PickFailed(PickOutcome.SLIPPED, "place", "grasp_method", f"The {attempt.label} was lost on the way.")
     hand.open(config.release_gap)
     await context.until(lambda: hand.status.state is GripState.OPEN, 2.0)
+
+
+async def set_back(context: Context, config: PickConfig, travel: Travel, side: Side, T: Array, gap: float) -> None:
+    """Bring what a hand holds, and cannot bring away, as far back as it goes to `T`, where it was gripped.
+
+    Args:
+        T: (4, 4) of the gripper in odom.
+        gap: between the fingers as they came, which there is room for [m].
+    """
+    context.say("place", "Setting it back where it was taken.")
+    arm, hand = context.arms[side], context.hands[side]
+    with suppress(StageFailed):
+        await travel.carry(side, [lifted(T, config.clearance)], config.travel_speed)
+        stop = await ForceGuard.at_rest(context, side, T[:3, 2], config.press_force, lead=LEAD)
+        await travel.line(side, T, config.descend_speed, "place", stop=stop)
+        hand.open(gap)
+        await context.until(lambda: hand.status.state is GripState.OPEN, 2.0)
+        await arm.move(lifted(arm.commanded, config.clearance), config.travel_speed)
 
 
 async def _nearer(context: Context, config: PickConfig, travel: Travel, attempt: Attempt, middle: Array) -> None:
