@@ -27,6 +27,8 @@ EVERY = 300.0
 """Time between two looks at the memory [s]."""
 PATIENCE = 300.0
 """Time that a pick may take by the clock of the wall [s]."""
+IN_REACH = 3
+"""Loose screws of a new robot that the right hand brings to the tray: after so many it has a new robot again."""
 PICKED = "succeeded"
 PICK, ACTION = "golem_interfaces/action/Pick", "/skill/pick"
 
@@ -95,7 +97,7 @@ def main() -> None:
                 ros.do("listen", name=row.name, type=row.type, keep=0, depth=row.qos.depth, **qos)
             memory, ended = [robot.memory()], Counter[str]()
             goal = cdr(codec.action(PICK).Goal("screw", "tray", "right"))
-            begin = time.monotonic()
+            begin, taken = time.monotonic(), 0
             end = begin + 60.0 * options.minutes
             while time.monotonic() < end:
                 given = ros.do("give", name=ACTION, type=PICK, goal=goal)
@@ -111,8 +113,10 @@ def main() -> None:
                     how = PICKED if result.success else f"{result.stage}: {result.reason}"
                 ended[how] += 1
                 print(f"{time.monotonic() - begin:7.1f} s: {how}", file=sys.stderr)
-                if how != PICKED:
+                taken = taken + 1 if how == PICKED else IN_REACH
+                if taken == IN_REACH:
                     robot.renew()
+                    taken = 0
                 if time.monotonic() > begin + EVERY * len(memory):
                     memory.append(robot.memory())
             memory.append(robot.memory())
