@@ -11,26 +11,29 @@ import pytest
 from golem.errors import ConfigError
 from golem.runtime.bringup.base import BringupConfig, BringupStep, StepFinding, StepRefused, Task, Workbench
 from golem.runtime.bringup.bringup_command import CHECKS, FILE, BringupReport, run_checks
+from golem.runtime.bringup.motor_checks import check_motion
 
 
 class Nobody:
     """A person who hears everything and does nothing."""
 
-    def __init__(self) -> None:
+    def __init__(self, says: str = "same") -> None:
         self.heard: list[str] = []
+        self._says = says
 
     def tell(self, text: str) -> None:
         self.heard.append(text)
 
     def confirm(self, question: str, word: str) -> bool:
-        return False
+        self.heard.append(question)
+        return word == self._says
 
     def act(self, task: Task) -> None:
         raise AssertionError("nothing is to be done here")
 
 
-def bench() -> Workbench:
-    return Workbench(cast(Any, None), Nobody(), BringupConfig(), lambda: cast(Any, None))
+def bench(says: str = "same") -> Workbench:
+    return Workbench(cast(Any, None), Nobody(says), BringupConfig(), lambda: cast(Any, None))
 
 
 def checks(done: list[str], outcomes: dict[str, bool], lasting: str = "") -> tuple[BringupStep, ...]:
@@ -66,6 +69,36 @@ def test_what_lasts_is_not_repeated_unless_asked(tmp_path: Path) -> None:
     assert run_checks(bench(), BringupReport(tmp_path, "domain 1"), row, again=())
     assert run_checks(bench(), BringupReport(tmp_path, "domain 1"), row, again=("two",))
     assert done == ["one", "two", "one", "one", "two"]
+
+
+def test_another_robot_on_the_same_domain_is_checked_anew(tmp_path: Path) -> None:
+    done: list[str] = []
+    row = checks(done, {"one": True, "two": True}, lasting="two")
+    assert run_checks(bench(), BringupReport(tmp_path, "domain 1"), row, again=())
+    assert run_checks(bench("no"), BringupReport(tmp_path, "domain 1"), row, again=())
+    assert done == ["one", "two"] * 2
+
+
+def test_a_repetition_that_is_cut_short_leaves_no_old_pass(tmp_path: Path) -> None:
+    def cut(_: Workbench) -> StepFinding:
+        raise KeyboardInterrupt
+
+    assert run_checks(bench(), BringupReport(tmp_path, "domain 1"), checks([], {"two": True}, lasting="two"), again=())
+    row = (BringupStep("two", "Title of two", cut, lasting=True),)
+    with pytest.raises(KeyboardInterrupt):
+        run_checks(bench(), BringupReport(tmp_path, "domain 1"), row, again=("two",))
+    assert not BringupReport(tmp_path, "domain 1").passed("two")
+
+
+def test_nothing_moves_before_a_person_says_so(tmp_path: Path) -> None:
+    class Link:
+        def spin(self, *_: Any) -> bool:
+            return True
+
+    at = bench("no")
+    at.link, at.gate = cast(Any, Link()), cast(Any, type("Gate", (), {"code": None})())
+    finding = check_motion(at)
+    assert not finding.passed and "nobody says that the robot may move" in finding.text
 
 
 def test_a_refusal_fails_its_check(tmp_path: Path) -> None:

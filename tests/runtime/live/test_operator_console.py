@@ -36,5 +36,21 @@ def test_enter_presses_and_words_are_asked_for(live: Live) -> None:
     console = Console(node, wait, said.append)
     console.connect("start it")
     console.run(lines())
-    assert states == [GateState.STOP1, GateState.STOP1, GateState.ARMED, GateState.ACTIVE]
-    assert said[0] == "pressed" and "Did you mean 'reset'?" in said[2] and said[-1] == "active"
+    assert states == [*[GateState.STOP1] * 4, GateState.ARMED, GateState.ACTIVE]
+    assert said[1] == "pressed" and "Did you mean 'reset'?" in said[4] and said[-1] == "active"
+
+
+def test_a_mistyped_stop_stops(live: Live) -> None:
+    live.activate()
+    _, node = live.member("console")
+
+    def wait(answer: Any) -> Any:
+        while not answer.done:
+            live.run(TICK)
+            node.poll()
+        return answer.result()
+
+    console = Console(node, wait, lambda text: None)
+    console.connect("start it")
+    console.run(["stpo\n"])
+    assert live.state is GateState.STOP1

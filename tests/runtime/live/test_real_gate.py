@@ -66,6 +66,21 @@ def test_a_real_robots_motors_are_not_touched_before_its_own_controller_lets_go_
     live.leave_quietly(node)
 
 
+def test_a_button_pressed_before_the_activation_leaves_the_motors_damped(live: Live) -> None:
+    let_go(live)
+    participant, node = live.member("listener")
+    motors = participant.reader("rt/lowcmd", hg.LOW_CMD.type_name, Qos(reliable=False, depth=1000))
+    assert live.state is GateState.ARMED
+    assert live.ask("press")[0]
+    live.run(0.3)
+    motors.take(1000)
+    live.run(0.3)
+    assert (live.state, live.reason) == (GateState.INIT, "estop_pressed")
+    told = [wire.decode_low_command(sample.payload, 0.0) for sample in motors.take(1000)]
+    assert len(told) > 100 and not any(command.kp.any() for command in told) and all(c.kd.all() for c in told)
+    live.leave_quietly(node)
+
+
 def test_a_motion_switcher_that_falls_silent_keeps_the_gate_shut_but_stops_nobody(
     live: Live, monkeypatch: pytest.MonkeyPatch
 ) -> None:

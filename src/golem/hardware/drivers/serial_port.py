@@ -34,7 +34,7 @@ class SerialPort:
         try:
             self._port = serial.Serial(name, baud, timeout=0, write_timeout=0, exclusive=True)
         except (OSError, ValueError, termios.error) as error:
-            raise PortError(f"The serial port '{name}' cannot be opened: {_reason(error)}.") from error
+            raise PortError(f"The serial port '{name}' cannot be opened: {_reason(error)}. {_remedy(error)}") from error
 
     def read(self) -> bytes:
         """Return what has come, b"" if nothing has. Raises PortError: the port is gone."""
@@ -75,5 +75,14 @@ class SerialPort:
 def _reason(error: Exception) -> str:
     number = getattr(error, "errno", None)
     if number == errno.EAGAIN:
-        return "another process has it"
+        return "another process has it, or another device of this one"
     return os.strerror(number) if number else str(error)
+
+
+def _remedy(error: Exception) -> str:
+    if getattr(error, "errno", None) == errno.EACCES:
+        return "Join the group that may, mostly 'dialout': sudo usermod -aG dialout $USER, then log in again."
+    from serial.tools import list_ports
+
+    ports = sorted(port.device for port in list_ports.comports())
+    return f"This machine has {', '.join(ports) or 'no serial port'}."

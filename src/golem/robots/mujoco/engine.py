@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import get_args
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from golem.errors import unknown_name
 from golem.interfaces.lidar import LidarImu, LidarScan
 from golem.native import CompiledStage, address, new_record, own
 from golem.robots.model import magpie_model
@@ -18,7 +20,7 @@ from golem.robots.model.table import BASE_LINK, load_limits
 from golem.robots.mujoco import twin_stages
 from golem.robots.mujoco.auto_exposure import AutoExposure
 from golem.robots.mujoco.camera import CameraRig
-from golem.robots.mujoco.config import WORKSHOPS, MujocoConfig
+from golem.robots.mujoco.config import WORKSHOPS, MujocoConfig, Support
 from golem.robots.mujoco.external_forces import Hoist, Pushes
 from golem.robots.mujoco.hand_servos import HandServos
 from golem.robots.mujoco.lidar_sensor import LidarMoment, LidarSensor
@@ -176,8 +178,11 @@ class MujocoRobot:
 
     @classmethod
     def on_feet(cls, options: Mapping[str, object]) -> bool:
-        """Return whether the option `support` has the robot stand; see `Standing`."""
-        return options.get("support") == "ground"
+        """Return whether the option `support` has the robot stand; see `Standing`. Raises ConfigError: it is none."""
+        support = options.get("support", "hoist")
+        if support not in get_args(Support):
+            raise unknown_name("support of a robot", str(support), get_args(Support))
+        return support == "ground"
 
     @property
     def living(self) -> bool:

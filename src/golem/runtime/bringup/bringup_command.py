@@ -62,9 +62,21 @@ class BringupReport:
         """Return whether a check has passed before."""
         return name in self._entries and self._entries[name].finding.passed
 
+    def last(self, names: Collection[str]) -> str:
+        """Return when the newest of the checks called `names` passed; empty: none has."""
+        return max((self._entries[name].at for name in names if self.passed(name)), default="")
+
+    def forget(self, names: Collection[str]) -> None:
+        """Forget what the checks called `names` found. Raises OutputError: the folder cannot be written to."""
+        self._entries = {name: entry for name, entry in self._entries.items() if name not in names}
+        self._write()
+
     def add(self, name: str, finding: base.StepFinding) -> None:
         """Keep what a check found. Raises OutputError: the folder cannot be written to."""
         self._entries[name] = Entry(datetime.now().astimezone().isoformat(timespec="seconds"), finding)
+        self._write()
+
+    def _write(self) -> None:
         rows = {
             name: {"at": e.at, "passed": e.finding.passed, "text": e.finding.text, "figures": e.finding.figures}
             for name, e in self._entries.items()
@@ -289,7 +301,7 @@ def run_bringup(config: base.BringupConfig, person: base.BringupPerson | None = 
         finally:
             if bench.gate is not None:
                 bench.gate.end()
-    person.tell(f"Report: {report.page(CHECKS)}")
+            person.tell(f"Report: {report.page(CHECKS)}")
     return done
 
 
@@ -298,9 +310,13 @@ def run_checks(
 ) -> bool:
     """Do the checks in order, those left out that last and have passed; return whether none failed."""
     tell = bench.person.tell
+    lasting = [check.name for check in checks if check.lasting]
+    if at := report.last(lasting):
+        text = f"Checks passed before, on {at}. It is the same robot, and nothing was rewired since: type 'same'."
+        report.forget(again if bench.person.confirm(text, "same") else lasting)
     for number, check in enumerate(checks, 1):
         head = f"{number}/{len(checks)} {check.title}"
-        if check.lasting and report.passed(check.name) and check.name not in again:
+        if check.lasting and report.passed(check.name):
             tell(f"{head}: has passed before.")
             continue
         tell(f"{head} ...")
@@ -311,6 +327,7 @@ def run_checks(
         report.add(check.name, finding)
         tell(f"{head}: {'passed' if finding.passed else 'FAILED'}: {finding.text}.")
         if not finding.passed:
-            tell("It goes no further until this passes; start 'golem bringup' again then.")
+            tell("It goes no further until this passes; start 'golem bringup' again then. Keep the robot hung: once")
+            tell("its own controllers have let go of the motors, nobody holds them when this ends.")
             return False
     return True

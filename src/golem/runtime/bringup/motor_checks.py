@@ -29,7 +29,7 @@ DRIFT = 0.35
 
 
 def check_hoist(bench: Workbench) -> StepFinding:
-    """A person says that the robot hangs and holds its own stop, and the legs carry nothing."""
+    """A person says that the robot hangs, its feet clear of the floor, and holds its own stop."""
     ready = bench.person.confirm(
         "The robot hangs, its feet are clear of the floor, and you hold its own emergency stop. Type 'hanging'.",
         "hanging",
@@ -118,6 +118,13 @@ def check_motion(bench: Workbench) -> StepFinding:
     """With a share of the gains every motor moves its own joint, in its direction; then the gate stops the robot."""
     bench.need_gate()
     link = bench.link
+    seconds = RISE + 2.0 * PULSE * NUM_JOINTS
+    text = (
+        f"All {NUM_JOINTS} joints move now, one after the other, by {SWING:g} to {SWINGS * SWING:g} rad, for about "
+        f"{seconds:.0f} s. Nobody touches the robot or is within its reach. Type 'move'."
+    )
+    if not bench.person.confirm(text, "move"):
+        return StepFinding(False, "nobody says that the robot may move")
     if not link.spin(bench.config.patience, link.calm):
         return StepFinding(False, "the robot does not come to rest")
     start = link.states[-1][1].q.copy()
@@ -132,14 +139,18 @@ def check_motion(bench: Workbench) -> StepFinding:
         return StepFinding(False, f"the gate does not open: {answer}")
     began = link.states[-1][1].t
 
+    drift = 0.0
+
     def rise() -> None:
-        motion.level = min(1.0, (link.states[-1][1].t - began) / RISE)
+        nonlocal drift
+        drift = max(drift, float(np.abs(link.states[-1][1].q - start).max()))
+        rising = (link.states[-1][1].t - began) / RISE
+        motion.level = min(1.0, rising) if drift <= DRIFT else 0.0  # a motor that runs away is let go at once
         send()
 
     link.pass_time(RISE + 0.5, rise)
     figures: dict[str, float | str] = {}
     wrong = _stopped(bench)
-    drift = float(np.abs(link.states[-1][1].q - start).max())
     figures["drift while the gains rise [rad]"] = round(drift, 3)
     if not wrong and drift > DRIFT:
         wrong = f"a joint moved by {drift:.2f} rad while the gains rose"

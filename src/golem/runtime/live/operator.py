@@ -17,7 +17,7 @@ from tyro.conf import OmitArgPrefixes, Positional
 
 from golem.errors import ConfigError, GolemError, unknown_name
 from golem.interfaces import public
-from golem.interfaces.payloads import GateState
+from golem.interfaces.payloads import GateState, GateStatus, Reason
 from golem.interfaces.ros_convert import to_gate_status
 from golem.middleware.dds.base import Participant
 from golem.middleware.dds.domain import DdsConfig
@@ -77,7 +77,14 @@ def run_request(what: str, config: RequestConfig) -> bool:
         if not service:
             return _status(node, config.dds)
         kind = next(row.type for row in public.SERVICES if row.name == service)
-        response = ask(node, service, kind, request, f"start it with: {config.dds.command('safety')}")
+        try:
+            response = ask(node, service, kind, request, f"start it with: {config.dds.command('safety')}")
+        except RosError as error:
+            if what not in ("stop", "press"):
+                raise
+            raise RosError(
+                f"NOT STOPPED: press the robot's own emergency stop. No gate answers on {config.dds}."
+            ) from error
         log_line(response.message)
         return response.success
 
@@ -103,23 +110,28 @@ def ask(node: RosNode, service: str, kind: str, request: Any, remedy: str) -> An
 
 
 def _status(node: RosNode, dds: DdsConfig) -> bool:
-    row = public.topic("/safety/status")
-    subscription = node.subscription(row.name, row.type, None, row.qos)
-    if not until(node, lambda: subscription.latest() is not None, SEARCH):
+    status = _heard(node)
+    if status is None:
         raise RosError(f"No safety gate on {dds}; start one with: {dds.command('safety')}")
-    message = subscription.latest()
-    assert message is not None
-    status = to_gate_status(message)
     log_line(describe_status(status))
     return status.state is GateState.ACTIVE
+
+
+def _heard(node: RosNode) -> GateStatus | None:
+    """Return what the gate says of itself; None: there is none."""
+    row = public.topic("/safety/status")
+    subscription = node.subscription(row.name, row.type, None, row.qos)
+    until(node, lambda: subscription.latest() is not None, SEARCH)
+    message = subscription.latest()
+    return None if message is None else to_gate_status(message)
 
 
 def run_take(config: TakeConfig) -> bool:
     """Have the robot's own controller let go of the motors; return whether none of them has them now.
 
     Raises:
-        ConfigError: nobody said that the robot hangs.
-        RosError: nobody answers for the robot.
+        ConfigError: nobody said that the robot hangs, or the gate would not damp the motors.
+        RosError: nobody answers for the robot, or there is no gate.
     """
     with member("operator", config.dds) as (participant, node):
         return _take(participant, node, config)
@@ -138,6 +150,13 @@ def _take(participant: Participant, node: RosNode, config: TakeConfig) -> bool:
     if not answered(lambda: switcher.known, SEARCH):
         raise RosError(f"No robot on {config.dds} says which of its own controllers has the motors; is it switched on?")
     if not switcher.free:
+        status = _heard(node)
+        if status is None:
+            raise RosError(
+                f"No safety gate on {config.dds} would damp the motors: start one with: {config.dds.command('safety')}"
+            )
+        if status.reason is not Reason.HELD and status.state is GateState.INIT:
+            raise ConfigError(f"The gate would not damp the motors: {status.why}. Mend that first.")
         if not config.hanging:
             raise ConfigError(
                 f"'{switcher.owner}' has the motors. A robot that stands falls once it lets go of them: hang it up, "
@@ -155,8 +174,8 @@ def _take(participant: Participant, node: RosNode, config: TakeConfig) -> bool:
 WORDS = tuple(word for word, (service, _) in REQUESTS.items() if service)
 """What can be typed; an empty line is the first that helps in an emergency: press."""
 HELP = (
-    "Enter presses the virtual emergency stop, or asks for a stop where there is a board; "
-    f"or type {', '.join(WORDS)}. Ctrl-D ends this."
+    "Enter, or a word that is none of these, stops the robot; Enter presses the virtual emergency stop, too. "
+    f"Type {', '.join(WORDS)}. Ctrl-D ends this."
 )
 
 
@@ -192,10 +211,14 @@ class Console:
         for line in lines:
             word = line.strip() or "press"
             try:
-                if word not in WORDS:
+                if word in WORDS and word != "press":
+                    self._ask(word)
+                    continue
+                # A robot with a button of its own has none that can be pressed from here; who mistypes may mean a stop.
+                self._ask("stop")
+                if word != "press":
                     raise unknown_name("request", word, WORDS)
-                if not self._ask(word) and word == "press":
-                    self._ask("stop")  # a robot with a button of its own has none that can be pressed from here
+                self._ask("press")
             except GolemError as error:
                 self._tell(str(error))
 

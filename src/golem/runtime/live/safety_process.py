@@ -155,7 +155,7 @@ class SafetyProcess:
         self._base_stamp = -math.inf
         self._crowded, self._unheard = "", ""
         self._listeners: set[bytes] | None = None
-        self._foreign = -math.inf
+        self._foreign, self._had = -math.inf, False
         self._looks, self._diagnoses, self._reports = Every(LOOK), Every(DIAGNOSE), StatusReports(endpoints)
         self._steps = 0
         self._ending, self._halts = False, False
@@ -269,14 +269,19 @@ class SafetyProcess:
     def _tell(self, command: LowCommand, answers: float = 0.0) -> None:
         """Write `command` to the motors, unless the robot's own controllers have them or a shut gate never had them.
 
+        What it had it goes on damping: a button that is pressed before the activation does not leave motors alone.
+
         Whoever gets them from a robot in motion gets them damped once: until they speak our last command stands. While
         the robot moves and is damped only an answer says that they have: drives that hear nothing may go on with the
         last command. Once it is limp, as after a reboot, silence says so, too.
         """
-        limp, switcher = self.status.state is GateState.STOP0, self._switcher
+        state, switcher, machine = self.status.state, self._switcher, self._arrivals.mode_machine
+        shut = state is GateState.INIT
+        limp = shut or state is GateState.STOP0
         theirs = self._real and bool(switcher.owner or (limp and not switcher.free)) and not self._halts
-        machine = self._arrivals.mode_machine
-        if machine is not None and self.status.state is not GateState.INIT and not theirs:
+        self._had = not theirs and (self._had or not shut)
+        if machine is not None and self._had:
+            command = passive(command.t, self._arrivals.state, self._damping) if shut else command
             payload = convert.encode_low_command(command, machine, answers)
             self._out.write(payload)
             if self._black_box is not None:

@@ -195,7 +195,9 @@ class GateIn:
         self._t = t
         silent = self._clock() - self._heard_at > SILENCE
         if silent or self._status is None:
-            self._bus.publish(topics.SAFETY, GateStatus(t, GateState.INIT, None, "the safety process is silent"), t)
+            moved = self._status is not None and self._status.state in (GateState.ACTIVE, GateState.STOP2)
+            text = LOST if moved else "the safety process is silent"
+            self._bus.publish(topics.SAFETY, GateStatus(t, GateState.INIT, None, text), t)
         else:
             self._bus.publish(topics.SAFETY, self._status, t)
 
@@ -234,6 +236,7 @@ class RemoteGantry:
         self.on_gantry = False
 
 
+LOST = "ALARM, the safety gate is silent, and the robot was moving: press the robot's own emergency stop"
 MEAN = 5
 """Messages of a hand's wrench whose mean is sent: the torques of one tick are off by 2 to 3 N at the hand."""
 SHUT = "The safety gate is shut, see /safety/status."
