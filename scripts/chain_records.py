@@ -36,6 +36,7 @@ def difference(one: TrialOutcome, other: TrialOutcome) -> float:
 
 
 def main() -> int:
+    """Compare; return the exit code."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("-n", type=int, default=20)
     parser.add_argument("--seed", type=int, default=46)
