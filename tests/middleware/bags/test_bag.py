@@ -214,8 +214,12 @@ def test_what_a_user_can_do_wrong(tmp_path: Path) -> None:
     (tmp_path / "bag").mkdir()
     with pytest.raises(OutputError, match="exists already"):
         BagWriter(tmp_path / "bag")
-    with pytest.raises(BagError, match="No bag at"):
+    with pytest.raises(BagError, match="No bag at .*give an MCAP file"):
         Bag(tmp_path / "bag")
+    (tmp_path / "below").mkdir()
+    (tmp_path / "below" / "one.mcap").touch()
+    with pytest.raises(BagError, match=f"give one of {tmp_path / 'below'}"):
+        Bag(tmp_path)
     (tmp_path / "text").write_text("this is text")
     with pytest.raises(BagError, match="no MCAP file"):
         Bag(tmp_path / "text")

@@ -245,5 +245,6 @@ def _listen(host: str, port: int) -> socket.socket:
         listening.bind((host, port))
     except OSError as error:
         listening.close()
-        raise LidarError(f"Nobody can listen to the LiDAR at {host}, port {port}: {error.strerror}.") from error
+        text = f"Nobody can listen to the LiDAR at {host}, port {port}: {error.strerror}."
+        raise LidarError(f"{text} Give an address of this machine, in the LiDAR's network.") from error
     return listening

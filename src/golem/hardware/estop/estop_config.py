@@ -64,8 +64,8 @@ class EstopConfig:
     def __post_init__(self) -> None:
         if (self.use == "serial") != bool(self.port):
             raise ConfigError(
-                "The emergency stop 'serial' has a port, and 'virtual' has none: "
-                "estop: {use: serial, port: /dev/ttyACM0}."
+                "The emergency stop 'serial' has a port, and 'virtual' has none: --estop.use serial --estop.port "
+                "/dev/ttyACM0, or estop: {use: serial, port: /dev/ttyACM0} in a stack file."
             )
         if not 0.010 <= self.oldest <= 0.050:
             raise ConfigError(f"A frame of the emergency stop is fresh for 0.01 to 0.05 s, not {self.oldest:g}.")
