@@ -64,7 +64,7 @@ class Pick:
         """Pick one object with whatever grasp method the stack chose; see `Skill`."""
         self._method, self._names = context.grasp_method(), names_of(goal.label, goal.wanted)
         self._off, self._sure = np.array([*(goal.off or (0.0, 0.0)), 0.0]), bool(goal.off)
-        self._goal = goal
+        self._goal, self._from = goal, None
         await self._choose_height(context, goal)
         lines = LineTravel(context, self._config.travel_height, self._config.tolerance)
         planned = self._config.travel == "planned"
@@ -79,7 +79,7 @@ class Pick:
     async def _pursue(self, context: Context, goal: PickGoal) -> SkillResult:
         """Go through the stages, and home, whether they succeeded or not."""
         timings: dict[str, float] = {"start": context.t}
-        self._report, tried, self._across, self._from = PickReport(), list[Attempt](), None, None
+        self._report, tried, self._across = PickReport(), list[Attempt](), None
         result = SkillResult(True, "done", None, f"The {goal.label} was dropped in the {goal.container}.", timings)
         try:
             await self._travel.begin(self._config.travel_speed)

@@ -178,6 +178,7 @@ class ScriptedPerson:
 
     def confirm(self, question: str, word: str) -> bool:
         """Say the word."""
+        log_line(f"{question}\n> {word}")
         return True
 
     def act(self, task: Task) -> None:
