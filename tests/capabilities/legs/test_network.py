@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import golem
 from golem.capabilities.legs.network import load_network
 from golem.errors import ConfigError, MissingExtra
 
@@ -45,6 +48,15 @@ def test_an_onnx_network_runs(tmp_path: Path, batch: tuple[int | str, ...]) -> N
     np.testing.assert_allclose(network(x), np.full(12, 0.1), rtol=1e-6)
     assert network(x).shape == (12,)
     network.reset()
+
+
+def test_a_network_tells_nobody_outside_that_it_runs(tmp_path: Path) -> None:
+    # onnxruntime is silent in CI and under its own tests, too.
+    kept = {name: value for name, value in os.environ.items() if name in ("PATH", "LD_LIBRARY_PATH", "NUMBA_CACHE_DIR")}
+    code = "import sys, golem, onnxruntime as o; o.InferenceSession(sys.argv[1], providers=['CPUExecutionProvider'])"
+    network = next(Path(golem.__file__).parent.rglob("*.onnx"))
+    subprocess.run([sys.executable, "-c", code, str(network)], env=kept | {"HOME": str(tmp_path)}, check=True)
+    assert not [file for file in tmp_path.rglob("*") if "onnxruntime" in file.name]
 
 
 def test_a_network_that_does_not_fit_is_answered_with_both_sizes(tmp_path: Path) -> None:
