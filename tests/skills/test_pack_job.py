@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import itertools
 import random
 import signal
 import sqlite3
@@ -380,6 +381,22 @@ def test_what_a_palm_camera_is_off_by_is_told_to_the_next_pick_of_that_hand(tmp_
         picks = (goal for goal in world.goals if hasattr(goal, "off"))
         told = [off for goal, off in zip(picks, world.told, strict=True) if goal.side == side]
         assert told[0] == () and told[1:] == [pytest.approx(world.palm_off, abs=1e-3)] * (len(told) - 1)
+
+
+def test_a_hand_that_finds_nothing_learns_anew_what_its_camera_is_off_by(tmp_path: Path) -> None:
+    write_list(tmp_path / "list.csv", PLACES)
+
+    def says(number: int, tries: int) -> PickReport:
+        return PickReport("nothing_there" if number == 9 else "picked", [], "yes", "yes")
+
+    world = JobWorld(PLACES, tmp_path, says)
+    world.palm_off = (0.03, -0.02)
+    world.run(GOAL)
+    picks = [goal for goal in world.goals if hasattr(goal, "off")]
+    for side in ("left", "right"):
+        mine = [k for k, goal in enumerate(picks) if goal.side == side]
+        for before, after in itertools.pairwise(mine):
+            assert (world.told[after] == ()) == (world.asked[before] == 9)
 
 
 def test_a_neighbour_is_not_taken_for_what_was_let_go(tmp_path: Path) -> None:

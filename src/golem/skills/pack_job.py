@@ -242,6 +242,7 @@ class PackJob:
             if outcome is PickOutcome.TRAY_FULL:
                 return None
             if outcome is PickOutcome.NOTHING_THERE:  # odom drifts while the arms work, so its place may have moved
+                self._off.pop(side, None)  # or the hand learned it from a neighbour
                 await self._find_again(one.label, self._container(one.label))
         self._strikes = 0
         return None
