@@ -51,8 +51,9 @@ def main() -> int:
             (one, a), (other, b) = run(spec, True), run(spec, False)
             with_it, without, won = with_it + a, without + b, won + one.success
             figures += len(one.timings) + len(one.series)
-            worst = max(worst, difference(one, other))
-            if difference(one, other) > SAME:
+            apart = difference(one, other)
+            worst = max(worst, apart)
+            if apart > SAME:
                 bad += 1
                 print(f"{rung} {index}: {one.stage!r} {one.detail!r} / {other.stage!r} {other.detail!r}")
         print(

@@ -28,8 +28,8 @@ except ModuleNotFoundError as error:
 
 MAGIC = b"\x89MCAP0\r\n"
 CDR = "cdr"
-LISTED = 5
-"""Bags that are named, at most, where one is looked for in vain."""
+BELOW, LISTED = ("*/*.mcap", "*/*/*.mcap"), 5
+"""Where bags are looked for whose folder was not given, and how many are named at most."""
 KIND = re.compile(r"\w+/(msg|srv|action)/\w+")
 CONVERT = "`rosbags-convert --src {path} --dst FOLDER --dst-storage mcap` turns it into one"
 OTHERS = {
@@ -212,7 +212,7 @@ def _files(path: Path) -> list[Path]:
         other = next(iter([*path.glob("*.db3"), *path.glob("*.bag")]), None)
         if other is not None:
             return [other]
-        below = ", ".join(map(str, sorted({bag.parent for bag in path.rglob("*.mcap")})[-LISTED:]))
+        below = ", ".join(map(str, sorted({b.parent for d in BELOW for b in path.glob(d)})[-LISTED:]))
         ways = f"one of {below}" if below else "an MCAP file, or the folder that holds its *.mcap files"
         raise BagError(f"No bag at {path}; give {ways}.")
     return found

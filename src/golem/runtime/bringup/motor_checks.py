@@ -125,6 +125,7 @@ def check_motion(bench: Workbench) -> StepFinding:
     )
     if not bench.person.confirm(text, "move"):
         return StepFinding(False, "nobody says that the robot may move")
+    link.states.clear()  # those of before the question, which may have taken long
     if not link.spin(bench.config.patience, link.calm):
         return StepFinding(False, "the robot does not come to rest")
     start = link.states[-1][1].q.copy()

@@ -210,17 +210,15 @@ class Console:
         """Ask for what each line says, until there are no more; what fails is said, and the next line counts."""
         for line in lines:
             word = line.strip() or "press"
-            try:
-                if word in WORDS and word != "press":
-                    self._ask(word)
-                    continue
-                # A robot with a button of its own has none that can be pressed from here; who mistypes may mean a stop.
-                self._ask("stop")
-                if word != "press":
-                    raise unknown_name("request", word, WORDS)
-                self._ask("press")
-            except GolemError as error:
-                self._tell(str(error))
+            # A robot with a button of its own has none that can be pressed from here; who mistypes may mean a stop.
+            known = (word,) if word in WORDS else ("stop",)
+            for request in ("stop", "press") if word == "press" else known:
+                try:
+                    self._ask(request)
+                except GolemError as error:
+                    self._tell(str(error))
+            if word not in WORDS:
+                self._tell(str(unknown_name("request", word, WORDS)))
 
     def _ask(self, word: str) -> bool:
         service, request = REQUESTS[word]
