@@ -293,6 +293,8 @@ def _one_of(words: list[str], command: str, what: str, table: Mapping[str, tuple
     """Run what the first of `words` names in `table` with the options that follow."""
     name = _named(words, command, what, table)
     if name is None:
+        for each, (module, config, _) in table.items():
+            print(f"  {each:10} {getattr(importlib.import_module(module), config).__doc__.splitlines()[0]}")
         return 0
     module, config, run = table[name]
     owner = importlib.import_module(module)

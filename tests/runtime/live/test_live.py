@@ -55,6 +55,8 @@ def test_a_stack_that_dies_is_noticed_and_the_robot_damped_then_it_comes_back(li
     live.start_up()
     live.run(0.1)
     assert live.state is GateState.STOP1  # latched, whatever comes back
+    agreed, said = live.ask("activate")
+    assert not agreed and said.endswith("; reset it first")
     live.reset()
     assert live.ask("activate") == (True, "active")
 

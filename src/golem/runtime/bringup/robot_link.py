@@ -30,6 +30,7 @@ from golem.middleware.wire.struct_layout import WireError
 from golem.runtime.live.exclusive_writers import owner
 from golem.runtime.live.motion_switcher_client import CALLS, MotionSwitcherClient
 from golem.runtime.live.node_setup import ANSWER, SEARCH
+from golem.runtime.live.operator import not_stopped
 from golem.runtime.live.role_endpoints import RoleEndpoints
 from golem.types import Array, LowCommand, LowState
 
@@ -149,10 +150,11 @@ class RobotLink:
         if client is None:
             client = self._clients[service] = self.node.client(service, public.TRIGGER)
         if not self.spin(SEARCH, client.ready, every):
-            raise RosError(f"Nobody offers '{service}'; start it with: {self._dds.command('safety')}.")
+            start = f"Nobody offers '{service}'; start it with: {self._dds.command('safety')}."
+            raise RosError(not_stopped(self._dds) if what == "stop" else start)
         answer = client.call(Trigger_Request())
         if not self.spin(ANSWER, lambda: answer.done, every):
-            raise RosError(f"'{service}' does not answer.")
+            raise RosError(not_stopped(self._dds) if what == "stop" else f"'{service}' does not answer.")
         return str(answer.result().message)
 
     def command(self, q: Array, kp: Array, kd: Array) -> None:

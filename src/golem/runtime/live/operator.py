@@ -82,11 +82,14 @@ def run_request(what: str, config: RequestConfig) -> bool:
         except RosError as error:
             if what not in ("stop", "press"):
                 raise
-            raise RosError(
-                f"NOT STOPPED: press the robot's own emergency stop. No gate answers on {config.dds}."
-            ) from error
+            raise RosError(not_stopped(config.dds)) from error
         log_line(response.message)
         return response.success
+
+
+def not_stopped(dds: DdsConfig) -> str:
+    """Return what a person is told whose request to stop reached nobody."""
+    return f"NOT STOPPED: press the robot's own emergency stop. No gate answers on {dds}."
 
 
 def run_restart(config: RestartConfig) -> bool:

@@ -330,6 +330,8 @@ class SafetyProcess:
             done = self.status.reason is None  # the gate's own legs go on standing until the activation
             rest = f"{self._reset_after:g} s since the stop, and a robot at rest"
             said += "" if done else f"; a reset needs the button released, no fault, {rest}"
+        if request is OperatorRequest.ACTIVATE and not done:
+            said += "; reset it first" if self.status.stopped else "; mend that, then activate again"
         return Trigger_Response(done, said)
 
     def _hand_over(self) -> Trigger_Response:
