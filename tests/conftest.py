@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 from tests.domains import free_domain
 
 # MuJoCo reads this at its first import, so it must be set before any test module is collected.
@@ -20,7 +20,7 @@ if sys.platform == "linux" and not os.environ.get("DISPLAY"):
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 # The same examples every run: a failure is repeatable, and a loaded machine is no failure.
-settings.register_profile("golem", derandomize=True, deadline=None)
+settings.register_profile("golem", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("golem")
 
 REPOSITORY = Path(__file__).resolve().parent.parent

@@ -172,6 +172,16 @@ def test_damping_ends_limp(bench: Any) -> None:
     assert bench.results[-1].reason is Reason.REQUESTED
 
 
+def test_a_stop_is_latched_before_the_activation_too(bench: Any) -> None:
+    assert bench.tick().state is GateState.ARMED
+    result = bench.tick(request=OperatorRequest.STOP)
+    assert (result.state, result.reason) == (GateState.STOP1, Reason.REQUESTED)
+    assert bench.tick(request=OperatorRequest.ACTIVATE).state is GateState.STOP1
+    bench.wait(1.1)
+    assert bench.tick(request=OperatorRequest.RESET).state is GateState.ARMED
+    assert bench.tick(request=OperatorRequest.ACTIVATE).state is GateState.ACTIVE
+
+
 def test_reset_needs_the_button_out_and_a_request_and_does_not_restart(bench: Any) -> None:
     bench.activate()
     bench.tick(estop=EstopMessage(bench.t, 999, True))

@@ -1,7 +1,7 @@
 """The safety gate: a pure function between every motion command and the motors. Whatever is missing stops it.
 
     INIT   something is missing; limp           -> ARMED  once state and e-stop are sound
-    ARMED  sound; damps                         -> ACTIVE on request, INIT when no longer sound
+    ARMED  sound; damps                         -> ACTIVE or STOP1 on request, INIT when no longer sound
     ACTIVE commands pass, limited               -> STOP2  on a fault that leaves state and legs sound
                                                 -> STOP1  on any other
     STOP2  a controller of the gate stands      -> STOP1  when it cannot, or a stop is asked for; ACTIVE: see below
@@ -109,7 +109,9 @@ def check(inputs: GateInputs, limits: SafetyLimits, memory: GateMemory) -> GateR
     else:
         reason, detail = (None, "") if fault is None else (fault.reason, fault.detail)
         new = GateState.ARMED if fault is None else GateState.INIT
-        if new is GateState.ARMED and edge is OperatorRequest.ACTIVATE:
+        if new is GateState.ARMED and inputs.request is OperatorRequest.STOP:
+            new, reason = GateState.STOP1, Reason.REQUESTED  # who activates later may not know why it was asked for
+        elif new is GateState.ARMED and edge is OperatorRequest.ACTIVATE:
             refused = command_fault or (None if state is None else _opens(command, state, limits))
             if refused is not None:
                 reason, detail = refused.reason, refused.detail

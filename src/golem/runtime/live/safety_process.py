@@ -188,7 +188,8 @@ class SafetyProcess:
         self._switcher.poll()
         if self._crowded and any(self._is_foreign(sample) for sample in self._all_commands.take(8)):
             self._foreign = now
-        self._judge(OperatorRequest.STOP if self._ending else OperatorRequest.NONE)
+        ends = self._ending and self.status.state is not GateState.ARMED  # that is no stop for the black box
+        self._judge(OperatorRequest.STOP if ends else OperatorRequest.NONE)
         if self._diagnoses.due(now):
             self._diagnose(now)
 
