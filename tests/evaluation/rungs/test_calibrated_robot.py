@@ -33,7 +33,7 @@ def test_a_robot_that_was_calibrated_first_is_calibrated_once(tmp_path: Path, mo
     rung_of_errands = ErrandsRung(ErrandsOptions(calibrated=str(tmp_path / "kept")))
     for errand in ("k01", "p25"):
         spec = TrialSpec("errands", "object_map", "field", 9, 0, case={"errand": errand})
-        assert Path(rung_of_errands.arranged(spec, stack).parts["calibration"]["file"]) == file
+        assert Path(rung_of_errands.stack_of(spec).parts["calibration"]["file"]) == file
 
 
 def test_a_calibration_that_fails_is_a_failed_stage_and_leaves_no_file(

@@ -21,9 +21,7 @@ from golem.agent.tool_rules import Rules
 from golem.errors import unknown_name
 from golem.evaluation.base import DONE, Case, Results, TrialSpec
 from golem.evaluation.episodes.counter_watch import LIFTED, CounterWatch, ErrandWatch
-from golem.evaluation.episodes.episode import episode_seed
 from golem.evaluation.episodes.oracle import Oracle, whereabouts
-from golem.evaluation.rungs.calibrated_robot import calibrated
 from golem.evaluation.rungs.counter import ACROSS, AREA, FREE, LOOK, TIGHT, radius
 from golem.evaluation.rungs.kitchen_rung import Errand, KitchenOptions, KitchenRung, Verdict
 from golem.evaluation.rungs.pick_screw import SLOT, doable
@@ -58,8 +56,6 @@ class ErrandsOptions(KitchenOptions):
     """nominal or varied; see the rungs `counter-tether` and `tether`."""
     errand: tuple[str, ...] = ()
     """Names of errands, such as k01; none: all."""
-    calibrated: str = ""
-    """Folder of calibrations; see the rung `pack`."""
 
 
 class Asked:
@@ -139,11 +135,11 @@ class ErrandsRung(KitchenRung[ErrandsOptions]):
 
     def arranged(self, spec: TrialSpec, stack: Stack) -> Stack:
         """Return the stack of one errand; see `KitchenRung`."""
-        own, keep = SUITE[str(spec.case["errand"])].get("stack"), self.options.calibrated
-        if own is not None:
-            chosen = load_stack(own, profile=spec.profile).with_options("robot", layout=self.options.layout)
-            stack = replace(chosen, choices={**chosen.choices, "memory": stack.choice("memory")})
-        return calibrated(stack, episode_seed(spec.seed, spec.index), keep) if keep else stack
+        own = SUITE[str(spec.case["errand"])].get("stack")
+        if own is None:
+            return stack
+        chosen = load_stack(own, profile=spec.profile).with_options("robot", layout=self.options.layout)
+        return replace(chosen, choices={**chosen.choices, "memory": stack.choice("memory")})
 
     def errand(
         self, spec: TrialSpec, running: LockstepRunner, robot: MujocoRobot, kitchen: KitchenLayout, oracle: Oracle

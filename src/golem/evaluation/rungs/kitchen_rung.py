@@ -15,6 +15,7 @@ from golem.evaluation.blame.oracles import with_modules
 from golem.evaluation.episodes.counter_watch import ErrandWatch
 from golem.evaluation.episodes.episode import episode_seed, lost
 from golem.evaluation.episodes.oracle import Oracle
+from golem.evaluation.rungs.calibrated_robot import calibrated
 from golem.evaluation.rungs.pick_screw import ABORTED, SLOT, balance, let_go
 from golem.provenance import stack_facts
 from golem.robots.mujoco.balance import TRACE
@@ -37,6 +38,8 @@ class KitchenOptions:
 
     layout: LayoutKind = "varied"
     """nominal: the counter always has one height and one colour. varied: drawn from the trial's seed."""
+    calibrated: str = ""
+    """Folder of calibrations; see the rung `pack`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,13 +98,19 @@ class KitchenRung(Rung[O]):
         """Return `stack` with the world as a trial needs it."""
         return stack
 
+    def stack_of(self, spec: TrialSpec) -> Stack:
+        """Return the stack of a trial, whose robot was calibrated first where that is asked for."""
+        stack = self.arranged(spec, self.make_stack(spec.method, spec.profile, spec.overrides))
+        keep = self.options.calibrated
+        return calibrated(stack, episode_seed(spec.seed, spec.index), keep) if keep else stack
+
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
         stack = self.make_stack(method, profile, overrides)
         shared_context()
         return stack_facts(stack)
 
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
-        stack = self.arranged(spec, self.make_stack(spec.method, spec.profile, spec.overrides))
+        stack = self.stack_of(spec)
         running, robot = build(stack, episode_seed(spec.seed, spec.index))
         if not isinstance(robot, MujocoRobot) or not self.suits(robot):
             raise ConfigError(
