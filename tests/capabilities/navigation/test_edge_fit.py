@@ -49,3 +49,12 @@ def test_nothing_and_noise_are_no_edge() -> None:
     wild = noise + np.column_stack([0.8 * np.sin(25.0 * noise[:, 1]), np.zeros(4000)]) + (1.0, 0.0)
     found = near_edge(wild, PlanarPose(0.0, 0.0, 0.0), 4.0)
     assert isinstance(found, str) or found.slices < 20
+
+
+def test_what_stands_in_a_row_on_a_counter_is_not_its_edge() -> None:
+    # From close by belly and arms hide most of the rim, and a line through the things behind it has more points.
+    rim = np.concatenate([np.arange(-0.66, -0.3, 0.01), np.arange(0.46, 0.6, 0.01)])
+    row = np.concatenate([np.arange(-0.3, 0.46, 0.01), np.arange(0.6, 1.2, 0.01)])
+    places = [np.column_stack([np.full_like(rim, 0.37), rim]), np.column_stack([0.5 + 0.1 * row, row])]
+    edge = near_edge(np.concatenate(places), PlanarPose(0.0, 0.0, 0.0))
+    assert isinstance(edge, NearEdge) and abs(edge.pose.x - 0.37) < 0.01 and abs(edge.pose.yaw) < 0.02

@@ -108,15 +108,18 @@ def _rim(local: Array) -> Array:
 def _line(rim: Array) -> tuple[float, float, NDArray[np.bool_]] | None:
     """Return slope and offset of x = slope y + offset, and which points are on it; None where too few are."""
     rng = np.random.default_rng(0)
-    best: NDArray[np.bool_] = np.zeros(len(rim), np.bool_)
+    best, most = np.zeros(len(rim), np.bool_), 0
     for _ in range(TRIES):
         i, j = rng.choice(len(rim), 2, replace=False)
         if abs(rim[j, 1] - rim[i, 1]) < 2.0 * SLICE:
             continue
         slope = (rim[j, 0] - rim[i, 0]) / (rim[j, 1] - rim[i, 1])
-        good = np.abs(rim[:, 0] - rim[i, 0] - slope * (rim[:, 1] - rim[i, 1])) < INLIER
-        if abs(slope) < 1.0 and good.sum() > best.sum():
-            best = good
+        behind = rim[:, 0] - rim[i, 0] - slope * (rim[:, 1] - rim[i, 1])
+        good = np.abs(behind) < INLIER
+        # Nothing of a table is before its near edge: what is says that this is another line, through what stands on it.
+        score = int(good.sum()) - int((behind < -INLIER).sum())
+        if abs(slope) < 1.0 and score > most:
+            best, most = good, score
     if best.sum() < FEWEST:
         return None
     slope, offset = np.polyfit(rim[best, 1], rim[best, 0], 1)
