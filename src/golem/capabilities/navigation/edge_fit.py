@@ -16,6 +16,8 @@ INLIER = 0.02
 """Distance from the line within which a slice's point belongs to it [m]."""
 FEWEST = 8
 """Slices that make an edge: 0.4 m."""
+IN_FRONT = 2.0
+"""How many slices on a line one before it outweighs [own: one on one took a row of things for the edge]."""
 TRIES = 60
 LEVELS = (0.6, 1.3)
 """Heights between which the top of a table is looked for [m]."""
@@ -108,7 +110,7 @@ def _rim(local: Array) -> Array:
 def _line(rim: Array) -> tuple[float, float, NDArray[np.bool_]] | None:
     """Return slope and offset of x = slope y + offset, and which points are on it; None where too few are."""
     rng = np.random.default_rng(0)
-    best, most = np.zeros(len(rim), np.bool_), 0
+    best, most = np.zeros(len(rim), np.bool_), -math.inf
     for _ in range(TRIES):
         i, j = rng.choice(len(rim), 2, replace=False)
         if abs(rim[j, 1] - rim[i, 1]) < 2.0 * SLICE:
@@ -117,10 +119,10 @@ def _line(rim: Array) -> tuple[float, float, NDArray[np.bool_]] | None:
         behind = rim[:, 0] - rim[i, 0] - slope * (rim[:, 1] - rim[i, 1])
         good = np.abs(behind) < INLIER
         # Nothing of a table is before its near edge: what is says that this is another line, through what stands on it.
-        score = int(good.sum()) - int((behind < -INLIER).sum())
-        if abs(slope) < 1.0 and score > most:
+        score = float(good.sum()) - IN_FRONT * float((behind < -INLIER).sum())
+        if abs(slope) < 1.0 and good.sum() >= FEWEST and score > most:
             best, most = good, score
-    if best.sum() < FEWEST:
+    if not best.any():
         return None
     slope, offset = np.polyfit(rim[best, 1], rim[best, 0], 1)
     return float(slope), float(offset), best
