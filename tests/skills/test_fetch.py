@@ -10,6 +10,7 @@ import pytest
 from tests.skills.conftest import modules
 
 from golem.capabilities.memory.object_map import ObjectMap
+from golem.capabilities.navigation.edge_fit import NearEdge
 from golem.errors import ConfigError
 from golem.evaluation.conformance.memory_suite import look
 from golem.interfaces import topics
@@ -19,13 +20,13 @@ from golem.middleware.bus import Bus
 from golem.robots.model.pinocchio_model import Kinematics
 from golem.skills.base import SkillResult
 from golem.skills.context import Context
-from golem.skills.fetch import Fetch, FetchGoal
+from golem.skills.fetch import BESIDE, Fetch, FetchGoal, stance
 from golem.skills.place import SetDown
 from golem.skills.remember import Remember
 from golem.skills.runner import SkillRun
 from golem.skills.take import Take
 from golem.skills.take_config import TakeReport
-from golem.types import PlanarPose, Twist
+from golem.types import SIDES, PlanarPose, Twist
 
 LEGS = LegStatus(
     0.0, Twist(), Twist(), False, "", False, False, PlanarPose(0.0, 0.0, 0.0), np.zeros(2), "hold", speed=0.0
@@ -86,6 +87,14 @@ def test_it_takes_it_where_it_is_remembered_and_sets_it_down_as_it_was_taken() -
     assert placed.label == "mug"  # whose picture is to be a new one
     assert placed.off == (0.01, -0.07)  # of a head camera that is off by that much
     assert result.value.looked == pytest.approx([0.4, 0.0], abs=0.002)
+
+
+@pytest.mark.parametrize("y", [-0.3, 0.0, 0.3])
+def test_it_stands_where_the_hand_that_holds_it_gets_to_its_place(y: float) -> None:
+    edge = NearEdge(PlanarPose(0.8, 0.0, 0.0), 2.0, 0.0, 40)
+    for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
+        pose = stance(edge, PlanarPose(0.0, 0.0, 0.0), np.array([0.9, y]), side)
+        assert sign * pose.to(PlanarPose(0.9, y, 0.0)).y == pytest.approx(BESIDE)
 
 
 def test_a_place_that_was_seen_is_as_far_off_as_what_was_taken() -> None:

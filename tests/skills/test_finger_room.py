@@ -19,11 +19,16 @@ T_GRIPPER_CAMERA = np.linalg.inv(T_HAND_GRIPPER) @ T_HAND_CAMERA
 
 
 def room(
-    world: Any, box: tuple[float, float] | None, fingers: bool = False, x: tuple[float, float] = (-1.0, 1.0)
+    world: Any,
+    box: tuple[float, float] | None,
+    fingers: bool = False,
+    x: tuple[float, float] = (-1.0, 1.0),
+    top: float = TOP,
+    pressed: bool = False,
 ) -> tuple[FingerRoom, Array]:
     """Return what a hand `HIGH` above a plate at z = 0 has seen, and its pose on the plate.
 
-    The plate has a box `TOP` high over `x`, and over `box` along y, in the frame of the hand [m].
+    The plate has a box `top` high over `x`, and over `box` along y, in the frame of the hand [m].
     """
     info, T = RIGHT_HAND, world.context.arms["right"].pose
     T_odom_optical = lifted(T, HIGH - T[2, 3]) @ T_GRIPPER_CAMERA
@@ -31,15 +36,15 @@ def room(
     heights = np.zeros(down.shape)
     depth = (heights - T_odom_optical[2, 3]) / down
     if box is not None:
-        points = rays(info) * ((TOP - T_odom_optical[2, 3]) / down)[..., None] @ T_odom_optical[:3, :3].T
+        points = rays(info) * ((top - T_odom_optical[2, 3]) / down)[..., None] @ T_odom_optical[:3, :3].T
         local = (points + T_odom_optical[:3, 3] - T[:3, 3]) @ T[:3, :2]
         on = (local > (x[0], box[0])).all(axis=-1) & (local < (x[1], box[1])).all(axis=-1)
-        depth[on] -= TOP
+        depth[on] -= top
     if fingers:
         depth[:, :40] = TIPS - 0.02
         depth[:, 40:42] = TIPS + 0.02  # the edge, mixed with the ground
     frame = RgbdImage(0.0, info, np.zeros((1, 1, 3), np.uint8), depth.astype(np.float32), T_odom_optical)
-    seen = FingerRoom(world.context, "right", GAP)
+    seen = FingerRoom(world.context, "right", GAP, pressed)
     world.bus.publish(topics.rgbd_images("right_hand"), frame, 0.0)
     world.step()
     seen.look()
@@ -127,3 +132,14 @@ def test_beside_a_wall_the_hand_keeps_aside_along_the_width_of_its_fingers(world
     closer, T = room(world, (-1.0, 1.0), x=(0.0, 1.0))
     closer.way(T, lifted(T, HIGH), 0.15)
     assert closer.blocked and not closer.shift.any()
+
+
+@pytest.mark.parametrize("pressed", [False, True])
+@pytest.mark.parametrize(("box", "top"), [((0.03, 0.06), 0.005), ((0.052, 0.08), TOP)])
+def test_fingers_that_have_pressed_keep_off_a_low_head_and_one_close_beside(
+    world: Any, pressed: bool, box: tuple[float, float], top: float
+) -> None:
+    seen, T = room(world, box, top=top, pressed=pressed)
+    goal, _ = seen.way(T, lifted(T, 0.10), 0.15)
+    evades = seen.blocked or not np.allclose(goal[:, :3], T[:, :3]) or seen.shift.any()
+    assert evades == pressed

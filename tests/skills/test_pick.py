@@ -136,6 +136,18 @@ def test_what_no_hand_brings_to_the_tray_is_set_back_where_it_was_taken(full: An
     assert_safe(full)
 
 
+def test_a_hand_leans_where_it_reaches_no_place_in_the_tray_straight(full: Any, monkeypatch: Any) -> None:
+    carry, leans = LineTravel.carry, list[Array]()
+
+    async def leaning(self: LineTravel, side: Side, goals: list[Array], speed: float) -> None:
+        leans.extend(T[:3, 2] for T in goals if T[2, 2] > -0.99)
+        await carry(self, side, [T for T in goals if T[2, 2] > -0.99], speed)
+
+    monkeypatch.setattr(LineTravel, "carry", leaning)
+    np.testing.assert_allclose(let_go_at(full), TRAY + (0.0, 0.0, CONFIG.drop_height), atol=1e-9)
+    assert all(fingers[:2] @ TRAY[:2] > 0.3 * np.linalg.norm(TRAY[:2]) for fingers in leans)
+
+
 def test_a_neighbour_of_the_one_that_is_wanted_is_let_go_above_the_tray_too(full: Any, thing: Any) -> None:
     beside = SCREW + (0.0, 0.09, 0.0)
     see = full.objects["head"]
@@ -167,6 +179,17 @@ def test_what_the_head_camera_does_not_see_is_looked_for_by_the_hand_where_it_is
     full.step = step
     assert picked(full, wanted=here, level=(level,)).success
     assert not any("Looking around" in text for text in texts)
+
+
+def test_what_is_nearer_to_another_of_the_list_is_not_what_is_wanted(full: Any, thing: Any) -> None:
+    wanted, pitch = SCREW + HEAD_ERROR, np.array([0.0, 0.043, 0.0])
+    see = full.objects["head"]
+    full.objects["head"] = lambda: [replace(o, position=o.position + pitch) if o.label == "screw" else o for o in see()]
+    full.objects["right_hand"] = lambda: [thing("screw", SCREW + p, full.t) for p in (0.0 * pitch, pitch)]
+    where = {"wanted": tuple(wanted[:2].tolist()), "level": (float(wanted[2]),)}
+    # The head camera shows the neighbour alone; the hand looks where the other is listed.
+    result = picked(full, **where, landmarks=tuple(np.concatenate([wanted, wanted + pitch]).tolist()))
+    assert result.success and abs(result.value.tried[0].y - SCREW[1]) < 0.005
 
 
 def test_a_neighbour_is_not_taken_where_it_is_known_what_the_palm_camera_is_off_by(full: Any, thing: Any) -> None:

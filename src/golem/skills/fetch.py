@@ -47,12 +47,13 @@ BLIND = 0.60
 """Distance from a place at which a robot stands that finds no edge [m]."""
 
 
-async def stand_before(context: Context, place: Array) -> int:
+async def stand_before(context: Context, place: Array, side: Side | None = None) -> int:
     """Bring the robot before a place on a counter that is at most two metres away; returns how often it moved.
 
     Args:
         context: of the skill; its legs walk, and its stack listens to a LiDAR.
         place: (2,) or (3,) in odom [m].
+        side: the hand that is to get there; None: either.
 
     Raises:
         StageFailed: there is no edge, or no scan of it.
@@ -61,7 +62,7 @@ async def stand_before(context: Context, place: Array) -> int:
     while True:
         context.legs.drive(Twist())
         await context.sleep(SETTLE)
-        left = stance(await see_edge(context), PlanarPose.of(context.legs.pose), place)
+        left = stance(await see_edge(context), PlanarPose.of(context.legs.pose), place, side)
         off = math.hypot(left.x, left.y)
         context.say("dock", f"{100 * off:.0f} cm and {math.degrees(left.yaw):.0f} deg from the stance.")
         if (off < GOOD[0] and abs(left.yaw) < GOOD[1]) or moved == APPROACHES:
@@ -70,18 +71,21 @@ async def stand_before(context: Context, place: Array) -> int:
         moved += 1
 
 
-def stance(edge: NearEdge, here: PlanarPose, place: Array) -> PlanarPose:
+def stance(edge: NearEdge, here: PlanarPose, place: Array, side: Side | None = None) -> PlanarPose:
     """Return where to stand, as seen from the robot.
 
     Args:
         edge: of the counter, as seen from the robot.
         here: where the robot is in odom.
         place: (2,) or (3,) what a hand is to get to, in odom [m].
+        side: that hand; None: either.
     """
     across = edge.pose.to(here.to(PlanarPose(float(place[0]), float(place[1]), 0.0)))
     standoff = float(np.clip(AHEAD - across.x, *STANDOFF))
-    # On the side on which the robot is already: the hand of the other side is as good.
-    aside = float(np.clip(edge.pose.to(PlanarPose(0.0, 0.0, 0.0)).y - across.y, -BESIDE, BESIDE))
+    bounds = {"left": (-BESIDE, -BESIDE), "right": (BESIDE, BESIDE)}
+    # By either hand: on the side on which the robot is already.
+    low, high = bounds[side] if side else (-BESIDE, BESIDE)
+    aside = float(np.clip(edge.pose.to(PlanarPose(0.0, 0.0, 0.0)).y - across.y, low, high))
     return edge.pose @ PlanarPose(-standoff, across.y + aside, 0.0)
 
 
@@ -317,8 +321,11 @@ class Fetch:
                 return await self._try(context, goal, report, self._in_odom(context, place), True)
         return result
 
-    async def _go(self, context: Context, spot: Array, stage: float = STAGE) -> int:
-        """Bring the robot before a place in odom, first to the distance `stage` [m]; returns how often it stepped."""
+    async def _go(self, context: Context, spot: Array, stage: float = STAGE, side: Side | None = None) -> int:
+        """Bring the robot before a place in odom, for one hand or either; returns how often it stepped.
+
+        First it goes to the distance `stage` [m].
+        """
         here = PlanarPose.of(context.legs.pose)
         away = math.hypot(float(spot[0]) - here.x, float(spot[1]) - here.y)
         # Arms that hold on to a place in odom would be left behind.
@@ -326,7 +333,7 @@ class Fetch:
         if away > NEAR:
             await self._navigate(context, before(here, spot, stage))
         try:
-            return await stand_before(context, spot)
+            return await stand_before(context, spot, side)
         except StageFailed as failure:
             context.say("dock", f"{failure} Going by what is remembered alone.")
             await self._navigate(context, before(PlanarPose.of(context.legs.pose), spot, BLIND))
@@ -351,7 +358,7 @@ class Fetch:
                 if to is None:
                     await self._navigate(context, home)
                 else:
-                    report.approaches += await self._go(context, self._in_odom(context, to), CARRYING)
+                    report.approaches += await self._go(context, self._in_odom(context, to), CARRYING, side)
             await context.sleep(context.period)
             await context.until(lambda: context.hands[side].status.holding, 2.0 * PATIENCE)
         if to is None:

@@ -34,6 +34,8 @@ STRAYS = 3
 """So many cells may stand higher than what counts: noise of the depth comes alone."""
 ROUGH = 0.006
 """How far the tips may seem to be within the ground at their goal [m]: tilt of hand and ground, noise of the depth."""
+PRESSED = (0.008, 0.003)
+"""`MARGIN`, outside, and `ROUGH` after they have pressed on something: a finger squeezed itself beside a neighbour."""
 KEPT, RAISED = 0.001, 0.002
 """Room that the tips keep to the ground at their goal, and how far they are raised for that at most [m]."""
 ABOVE = 0.015
@@ -66,12 +68,13 @@ class FingerRoom:
         shift: (3,) by how much the hand keeps aside of its goal, in odom [m].
     """
 
-    def __init__(self, context: Context, side: Side, gap: float) -> None:
-        """Begin where the hand is now, with its fingers open by `gap` [m]."""
+    def __init__(self, context: Context, side: Side, gap: float, pressed: bool = False) -> None:
+        """Begin where the hand is now, with its fingers open by `gap` [m]; `pressed`: they pressed on something."""
+        margin, self._rough = PRESSED if pressed else (MARGIN, ROUGH)
         self._context, self._camera = context, f"{side}_hand"
         self._middle = context.arms[side].commanded[:2, 3].copy()
         self._heights = np.full((2 * HALF, 2 * HALF), np.nan)
-        self._tips, self._around = _fingertips(gap, MARGIN), _fingertips(gap, CLOSE)
+        self._tips, self._around = _fingertips(gap, MARGIN, margin), _fingertips(gap, CLOSE, CLOSE)
         self._turn = self._blocked_for = 0.0
         self._wanted = WAYS[0]
         self.blocked = False
@@ -103,8 +106,8 @@ class FingerRoom:
             T_now: (4, 4) where it is.
             speed: limit of its speed [m/s].
         """
-        if self._misses(T_goal, self._wanted) > ROUGH:
-            wanted = next((way for way in WAYS if self._misses(T_goal, way) < 0.5 * ROUGH), None)
+        if self._misses(T_goal, self._wanted) > self._rough:
+            wanted = next((way for way in WAYS if self._misses(T_goal, way) < 0.5 * self._rough), None)
             self.blocked = wanted is None
             self._wanted = wanted or self._wanted
         else:
@@ -113,7 +116,7 @@ class FingerRoom:
         if self._blocked_for > PATIENCE:
             self._blocked_for = 0.0
             ways = ((turn, aside) for turn in ACROSS for aside in (0.0, *ASIDE))
-            free = next((way for way in ways if self._misses(T_goal, way) < 0.5 * ROUGH), None)
+            free = next((way for way in ways if self._misses(T_goal, way) < 0.5 * self._rough), None)
             self.across = None if free is None else math.atan2(T_goal[1, 0], T_goal[0, 0]) + free[0]
         step = TURN_RATE * self._context.period
         turn, aside = self._wanted
@@ -121,7 +124,7 @@ class FingerRoom:
         T = _varied(T_goal, (self._turn, aside))
         self.shift = T[:3, 3] - T_goal[:3, 3]
         missing = -self.below(T)
-        up = ABOVE + missing if missing > ROUGH else min(max(KEPT + missing, 0.0), RAISED)
+        up = ABOVE + missing if missing > self._rough else min(max(KEPT + missing, 0.0), RAISED)
         T = lifted(T, up)
         room = min(self._room(self._around, T_now), self._room(self._around, at_height(T, T_now[2, 3])))
         return T, min(max(GAIN * room, SLOW), speed)
@@ -155,10 +158,10 @@ def _varied(T_goal: Array, way: tuple[float, float]) -> Array:
     return moved(T, way[1] * T[:3, 0])
 
 
-def _fingertips(gap: float, margin: float) -> Array:
-    """Return (n, 3) points that cover the ends of both open fingers and `margin` [m] around, in the grasp frame [m]."""
-    x = np.arange(-FINGER[0] - margin, FINGER[0] + margin + 1e-9, CELL)
-    y = np.arange(0.5 * gap - margin, 0.5 * gap + FINGER[1] + margin + 1e-9, CELL)
+def _fingertips(gap: float, inside: float, outside: float) -> Array:
+    """Return (n, 3) points that cover the ends of both open fingers and margins around, in the grasp frame [m]."""
+    x = np.arange(-FINGER[0] - outside, FINGER[0] + outside + 1e-9, CELL)
+    y = np.arange(0.5 * gap - inside, 0.5 * gap + FINGER[1] + outside + 1e-9, CELL)
     xy = np.stack(np.meshgrid(x, np.concatenate((-y, y))), axis=-1).reshape(-1, 2)
     return np.column_stack((xy, np.zeros(len(xy))))
 

@@ -52,6 +52,7 @@ class Pick:
         self._heights: list[float] = []
         self._looks_again = False
         self._across: float | None = None
+        self._pressed = False
         self._goal, self._off, self._sure = PickGoal(), np.zeros(3), False
         self._seen: Array | None = None
         self._from: tuple[Array, float] | None = None
@@ -79,7 +80,7 @@ class Pick:
     async def _pursue(self, context: Context, goal: PickGoal) -> SkillResult:
         """Go through the stages, and home, whether they succeeded or not."""
         timings: dict[str, float] = {"start": context.t}
-        self._report, tried, self._across = PickReport(), list[Attempt](), None
+        self._report, tried, self._across, self._pressed = PickReport(), list[Attempt](), None, False
         result = SkillResult(True, "done", None, f"The {goal.label} was dropped in the {goal.container}.", timings)
         try:
             await self._travel.begin(self._config.travel_speed)
@@ -288,7 +289,7 @@ class Pick:
         closing, camera, self._seen, droop = False, f"{attempt.side}_hand", None, np.zeros(3)
         down = arm.commanded[:3, 2]
         below = await ForceGuard.at_rest(context, attempt.side, down, self._config.press_force, lead=LEAD)
-        room = FingerRoom(context, attempt.side, gap)
+        room = FingerRoom(context, attempt.side, gap, self._pressed)
         observer = None
         if isinstance(law, SeeingLaw):
             observer = Observer(context.bus, law.cameras, law.width, topics.rgbd_images)
@@ -328,6 +329,7 @@ class Pick:
                     self._across, text = room.across, "Something stands where a finger is to go. Across there is room."
                     raise PickFailed(PickOutcome.BLOCKED, "servo", "grasp_method", text)
                 if not closing and below():
+                    self._pressed = True
                     text = f"The hand presses on something with {below.largest:.0f} N."
                     raise PickFailed(PickOutcome.BLOCKED, "servo", "localizer", text)
                 if not closing:

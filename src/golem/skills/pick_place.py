@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
+from itertools import product
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from golem.capabilities.planning.base import PlanRefused, Refusal
 from golem.interfaces.payloads import GripState
@@ -32,6 +34,8 @@ INSIDE = 0.03
 FARTHEST = 0.12
 """What the palm camera sees farther than this from where the head camera did is not that container [m] [own: see "The
 palm camera looks at the tray" in docs/decisions/arms.md]."""
+LEANS = (0.0, 0.35)
+"""How far a hand leans outwards that lets go [rad]: leaning, the fingers get some centimetres further."""
 SHARES = (1.0, 0.75, 0.5, 0.25)
 """Shares of the way to the middle that are tried."""
 SAME = 0.035
@@ -98,11 +102,11 @@ async def place(
     spots = container.places(config.drop_margin) + shift
     goals: list[Array] = []
     spots = HandReach(context, config).drop_order(attempt.side, spots, DROPS)
-    for turn in config.turns:
-        for spot in spots:
-            T = turned(arm.commanded, turn)
-            T[:3, 3] = spot + (0.0, 0.0, config.drop_height)
-            goals.append(T)
+    for lean, turn, spot in product(LEANS, config.turns, spots):
+        T = turned(arm.commanded, turn)
+        T[:3, :3] = _leaning(spot - context.T_odom_base[:3, 3], lean) @ T[:3, :3]
+        T[:3, 3] = spot + (0.0, 0.0, config.drop_height)
+        goals.append(T)
     context.say("place", f"Carrying it to the {attempt.container}.", target=container.sighting.position.tolist())
     try:
         await travel.carry(attempt.side, goals, config.travel_speed)
@@ -116,6 +120,12 @@ async def place(
         raise PickFailed(PickOutcome.SLIPPED, "place", "grasp_method", f"The {attempt.label} was lost on the way.")
     hand.open(config.release_gap)
     await context.until(lambda: hand.status.state is GripState.OPEN, 2.0)
+
+
+def _leaning(out: Array, lean: float) -> Array:
+    """Return the (3, 3) turn by `lean` [rad] that brings the palm back and leaves the fingers, `out` (3,) ahead."""
+    axis = np.cross((0.0, 0.0, -1.0), (*out[:2], 0.0))
+    return Rotation.from_rotvec(lean * axis / np.linalg.norm(axis)).as_matrix()
 
 
 async def set_back(context: Context, config: PickConfig, travel: Travel, side: Side, T: Array, gap: float) -> None:

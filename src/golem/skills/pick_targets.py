@@ -338,7 +338,7 @@ class TargetChoice:
         for new in (o for o in sightings.objects if o.label in names):
             if all(np.linalg.norm(new.position - known.position) > apart for known in objects):
                 objects.append(called(new, goal.label))
-        mine = [o for o in objects if counts_at(o.position, wanted, WANTED)]
+        mine = [o for o in objects if counts_at(o.position, wanted, WANTED) and not _listed_apart(goal, o.position)]
         mine = [o for o in mine if all(abs(float(o.position[2]) - level) < LEVEL for level in goal.level)]
         attempts = [
             Attempt(goal.label, goal.container, side, o)
@@ -366,6 +366,15 @@ class TargetChoice:
         """Return whether an object looks as if it were screwed down; the head camera is not sure of it."""
         height = height_above_ground(o)
         return height is not None and height < self._config.proud
+
+
+def _listed_apart(goal: PickGoal, position: Array) -> bool:
+    """Return whether a place (3,) is nearer to something else of the list than to what is wanted."""
+    if not (goal.wanted and goal.level and goal.landmarks):
+        return False
+    wanted = np.array([*goal.wanted[:2], goal.level[0]])
+    away = np.linalg.norm(np.array(goal.landmarks).reshape(-1, 3) - position, axis=1)
+    return bool(away.min() < np.linalg.norm(wanted - position) - 1e-3)
 
 
 def _as_listed(t: float, goal: PickGoal) -> Detections:

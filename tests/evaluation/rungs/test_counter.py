@@ -10,7 +10,7 @@ import pytest
 from golem.errors import ConfigError
 from golem.evaluation.base import Case, TrialSpec
 from golem.evaluation.episodes.episode import episode_seed
-from golem.evaluation.rungs.counter import CounterOptions, CounterTether, FetchRung, draw_errand
+from golem.evaluation.rungs.counter import CounterOptions, CounterTether, FetchRung, draw_errand, draw_fetch
 from golem.registry import configure
 from golem.robots.mujoco.config import MujocoConfig
 from golem.robots.mujoco.scene import lay_kitchen
@@ -49,6 +49,20 @@ def test_only_places_with_room_are_asked_for() -> None:
                 room = np.hypot(*np.subtract(other.position[:2], place)) - KINDS[kind][0] - KINDS[other.kind][0]
                 assert room > 0.01
     assert 0 < back < 20
+
+
+def test_a_place_is_free_after_the_thing_was_moved_too() -> None:
+    for index in range(24):
+        kitchen = draw_counter(np.random.default_rng(index))
+        spec = TrialSpec("fetch", "object_map", "field", 1, index, case={"moved": "yes"})
+        kind, place, after = draw_fetch(spec, kitchen)
+        moved = [b for a, b in zip(kitchen.things, after.things, strict=True) if a != b]
+        assert len(moved) == 2 and kind in [thing.kind for thing in moved]
+        (thing,) = (one for one in after.things if one.kind == kind)
+        for other in after.things:
+            if other is not thing:
+                room = np.hypot(*np.subtract(other.position[:2], place)) - KINDS[kind][0] - KINDS[other.kind][0]
+                assert room > 0.01
 
 
 def test_the_things_that_are_asked_for_are_tried_case_by_case() -> None:

@@ -218,12 +218,11 @@ class FetchRung(KitchenRung[FetchOptions]):
     def errand(
         self, spec: TrialSpec, running: LockstepRunner, robot: MujocoRobot, kitchen: KitchenLayout, oracle: Oracle
     ) -> Errand:
-        kind, _, (x, y) = draw_errand(spec, kitchen)
+        kind, (x, y), after = draw_fetch(spec, kitchen)
         at = running.stack.choice("robot").options.get("stance", (0.0, 0.0, 0.0))
         place = x + float(at[0]), y + float(at[1])
         looked = running.execute("remember", LOOK)
-        if spec.case.get("moved") == "yes":
-            _move(robot, kitchen, kind, spec.rng("moved"))
+        _move(robot, kitchen, after)
         watch, result = CounterWatch(running, robot, oracle, kind, True), looked
         if looked.success:
             spot = np.linalg.inv(robot.truth.T_world_odom) @ (*place, 0.0, 1.0)
@@ -243,13 +242,29 @@ class FetchRung(KitchenRung[FetchOptions]):
         return Errand(result, watch, judge)
 
 
-def _move(robot: MujocoRobot, kitchen: KitchenLayout, kind: str, rng: np.random.Generator) -> None:
-    """Let the first thing of a kind and another one, which is drawn, change places."""
-    things = kitchen.things
-    one = next(thing for thing in things if thing.kind == kind)
-    others = [thing for thing in things if thing is not one]
-    other = others[int(rng.integers(len(others)))]
-    data = robot.data
-    a, b = (robot.scene.model.joint(thing.body).qposadr[0] for thing in (one, other))
-    data.qpos[a : a + 2], data.qpos[b : b + 2] = data.qpos[b : b + 2].copy(), data.qpos[a : a + 2].copy()
-    mujoco.mj_forward(robot.scene.model, data)
+def draw_fetch(spec: TrialSpec, kitchen: KitchenLayout) -> tuple[str, tuple[float, float], KitchenLayout]:
+    """Return the kind of a thing, x, y of a place that is free for it, and the kitchen as it is by then.
+
+    Where the case says that it is moved meanwhile, it and another one, which is drawn, have changed places.
+    """
+    kind, _, place = draw_errand(spec, kitchen)
+    if spec.case.get("moved") != "yes":
+        return kind, place, kitchen
+    things, rng = list(kitchen.things), spec.rng("moved")
+    one = next(k for k, thing in enumerate(things) if thing.kind == kind)
+    other = [k for k in range(len(things)) if k != one][int(rng.integers(len(things) - 1))]
+    a, b = things[one], things[other]
+    things[one] = replace(a, position=(*b.position[:2], a.position[2]))
+    things[other] = replace(b, position=(*a.position[:2], b.position[2]))
+    after = replace(kitchen, things=tuple(things))
+    _, _, place = draw_errand(replace(spec, case={**spec.case, "thing": kind}), after)
+    return kind, place, after
+
+
+def _move(robot: MujocoRobot, before: KitchenLayout, after: KitchenLayout) -> None:
+    """Put things that stand elsewhere `after` than `before` there, each as much as it was moved."""
+    model, data = robot.scene.model, robot.data
+    for a, b in zip(before.things, after.things, strict=True):
+        address = model.joint(a.body).qposadr[0]
+        data.qpos[address : address + 2] += np.subtract(b.position[:2], a.position[:2])
+    mujoco.mj_forward(model, data)
