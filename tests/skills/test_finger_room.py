@@ -135,11 +135,18 @@ def test_beside_a_wall_the_hand_keeps_aside_along_the_width_of_its_fingers(world
 
 
 @pytest.mark.parametrize("pressed", [False, True])
-@pytest.mark.parametrize(("box", "top"), [((0.03, 0.06), 0.005), ((0.052, 0.08), TOP)])
-def test_fingers_that_have_pressed_keep_off_a_low_head_and_one_close_beside(
-    world: Any, pressed: bool, box: tuple[float, float], top: float
+@pytest.mark.parametrize(
+    ("box", "x", "top"),
+    [
+        ((0.03, 0.06), (-1.0, 1.0), 0.005),  # a low head
+        ((0.052, 0.08), (-1.0, 1.0), TOP),  # close beside
+        ((0.032, 0.040), (0.0, 0.004), TOP),  # a stud
+    ],
+)
+def test_fingers_that_have_pressed_keep_off_what_they_did_not_mind_before(
+    world: Any, pressed: bool, box: tuple[float, float], x: tuple[float, float], top: float
 ) -> None:
-    seen, T = room(world, box, top=top, pressed=pressed)
+    seen, T = room(world, box, x=x, top=top, pressed=pressed)
     goal, _ = seen.way(T, lifted(T, 0.10), 0.15)
     evades = seen.blocked or not np.allclose(goal[:, :3], T[:, :3]) or seen.shift.any()
     assert evades == pressed

@@ -34,8 +34,9 @@ STRAYS = 3
 """So many cells may stand higher than what counts: noise of the depth comes alone."""
 ROUGH = 0.006
 """How far the tips may seem to be within the ground at their goal [m]: tilt of hand and ground, noise of the depth."""
-PRESSED = (0.008, 0.003)
-"""`MARGIN`, outside, and `ROUGH` after they have pressed on something: a finger squeezed itself beside a neighbour."""
+PRESSED = (0.008, 0.003, 1)
+"""`MARGIN`, outside, `ROUGH` and `STRAYS` after they have pressed on something: a finger squeezed itself beside the head
+of a neighbour, or stood on a stud, which fills two cells."""
 KEPT, RAISED = 0.001, 0.002
 """Room that the tips keep to the ground at their goal, and how far they are raised for that at most [m]."""
 ABOVE = 0.015
@@ -70,7 +71,7 @@ class FingerRoom:
 
     def __init__(self, context: Context, side: Side, gap: float, pressed: bool = False) -> None:
         """Begin where the hand is now, with its fingers open by `gap` [m]; `pressed`: they pressed on something."""
-        margin, self._rough = PRESSED if pressed else (MARGIN, ROUGH)
+        margin, self._rough, self._strays = PRESSED if pressed else (MARGIN, ROUGH, STRAYS)
         self._context, self._camera = context, f"{side}_hand"
         self._middle = context.arms[side].commanded[:2, 3].copy()
         self._heights = np.full((2 * HALF, 2 * HALF), np.nan)
@@ -145,7 +146,7 @@ class FingerRoom:
         cells = self._cells(tips).clip(0, 2 * HALF - 1)
         room = tips[:, 2] - self._heights[cells[:, 0], cells[:, 1]]
         room = np.sort(room[np.isfinite(room)])
-        return float(room[STRAYS]) if len(room) > STRAYS else np.inf
+        return float(room[self._strays]) if len(room) > self._strays else np.inf
 
     def _cells(self, points: Array) -> NDArray[np.int64]:
         """Return the (n, 2) cells of points (n, 3) in odom."""
