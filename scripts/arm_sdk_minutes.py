@@ -1,6 +1,6 @@
 """Drives the arms of a standing twin as a headset's program does: `python scripts/arm_sdk_minutes.py [SECONDS] [SEED]`.
 
-A program asks for the arms over /arm_sdk at 50 Hz, as xr_teleoperate's does, with its gains and torques against gravity:
+A program asks for the arms over /arm_sdk at 50 Hz, as xr_teleoperate's does, with its gains, and torques of gravity:
 weight 0 to 1, then joints that move both wrists to and fro as an operator does (sums of sines of 0.05 to 0.5 Hz, drawn
 from the seed), then weight 1 to 0. Twin, gate and stack are three members of a domain in one process, in simulated
 time. Prints whether the robot stands, how far the wrists are by the reported joints from where they were asked to be,
