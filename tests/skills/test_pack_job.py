@@ -130,6 +130,19 @@ def test_what_was_not_seen_in_the_tray_is_lost_or_tried_again_if_it_is_still_the
     assert ends[4] == Fate.LOST and ends.count(Fate.IN_TRAY) == 31
 
 
+@pytest.mark.parametrize(("kind", "fate", "times"), [("nut", Fate.LOST, 1), ("screw", Fate.MISSING, 2)])
+def test_a_stud_is_not_taken_for_the_nut_that_was_let_go(tmp_path: Path, kind: str, fate: Fate, times: int) -> None:
+    rows = [f"{kind if k == 4 else 'screw'},{x},{y},{z},1" for k, (x, y, z) in enumerate(PLACES.tolist())]
+    (tmp_path / "list.csv").write_text("\n".join(["class,x,y,z,loose", *rows]))
+
+    def says(number: int, tries: int) -> PickReport:
+        return PickReport("picked", [], "no", "no") if number == 4 else picked(number, tries)
+
+    world = JobWorld(PLACES, tmp_path, says)
+    ends = world.run(DisassembleGoal(list="list.csv")).value.fates
+    assert ends[4] == fate and world.asked.count(4) == times
+
+
 def test_what_is_in_a_tray_stays_there_whatever_a_hand_seems_to_be_at(tmp_path: Path) -> None:
     class Askew(JobWorld):
         """Its palm camera has number 5 where 4 was."""

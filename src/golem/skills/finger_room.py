@@ -35,8 +35,8 @@ STRAYS = 3
 ROUGH = 0.006
 """How far the tips may seem to be within the ground at their goal [m]: tilt of hand and ground, noise of the depth."""
 PRESSED = (0.008, 0.003, 1)
-"""`MARGIN`, outside, `ROUGH` and `STRAYS` after they have pressed on something: a finger squeezed itself beside the head
-of a neighbour, or stood on a stud, which fills two cells."""
+"""`MARGIN`, outside, `ROUGH` and `STRAYS` after they have pressed on something: a finger squeezed itself beside a head,
+or stood on a stud, which fills two cells."""
 KEPT, RAISED = 0.001, 0.002
 """Room that the tips keep to the ground at their goal, and how far they are raised for that at most [m]."""
 ABOVE = 0.015

@@ -64,6 +64,7 @@ FATES = {
 """What becomes of a fastener that is not tried again."""
 AT_IT = (PickOutcome.PICKED, PickOutcome.TIGHT, PickOutcome.JAMMED, PickOutcome.SLIPPED)
 """Outcomes of a try in which the palm camera saw the fastener."""
+NO_TRAY = (PickOutcome.TRAY_FULL, PickOutcome.TRAY_MISSING)
 
 
 class PackJob:
@@ -336,21 +337,18 @@ class PackJob:
         taken = self._which(one, found) if found.tried and outcome in AT_IT else one
         if taken is not one:
             await self._tell(one, Fate.OPEN, f"A hand came to {taken.listed.name} instead.")
+        out = result.success and taken.label == "nut"  # where it was, a stud looks like it
         tries = 1 if outcome is PickOutcome.TIGHT and self._goal.loosened == "unknown" else TRIES
         if result.success and found.in_tray != Sight.NO:
             fate, self.report.picked = Fate.IN_TRAY, self.report.picked + 1
         elif outcome is PickOutcome.TRAY_FULL:
             self._full.add(name)
-        elif outcome in (PickOutcome.PICKED, PickOutcome.SLIPPED) and found.bore_empty != Sight.NO:
+        elif outcome in (PickOutcome.PICKED, PickOutcome.SLIPPED) and (out or found.bore_empty != Sight.NO):
             reason = f"It was let go and is not seen in the {name}." if result.success else reason
             await self._tell(taken, Fate.UNSETTLED, reason, side)
-            if not await self._still_there(taken):
-                fate, reason = Fate.LOST, f"{reason} Its place is empty now."
-        if (
-            fate is Fate.OPEN
-            and taken.tries >= tries
-            and outcome not in (PickOutcome.TRAY_FULL, PickOutcome.TRAY_MISSING)
-        ):
+            if out or not await self._still_there(taken):
+                fate, reason = Fate.LOST, reason if out else f"{reason} Its place is empty now."
+        if fate is Fate.OPEN and taken.tries >= tries and outcome not in NO_TRAY:
             fate = FATES.get(outcome, Fate.FAILED)
             fate = Fate.MISSING if fate is Fate.NOT_FOUND and not found.tried else fate
         tray = name if fate is Fate.IN_TRAY else ""
