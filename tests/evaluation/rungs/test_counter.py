@@ -44,6 +44,7 @@ def test_only_places_with_room_are_asked_for() -> None:
         _, _, place = draw_errand(TrialSpec("counter-tether", "centroid", "field", 1, index, case=case), kitchen)
         (thing,) = (one for one in kitchen.things if one.kind == kind)
         back += place == pytest.approx(tuple(thing.position[:2]))
+        assert place[0] - KINDS[kind][0] > kitchen.counter_front or place == pytest.approx(tuple(thing.position[:2]))
         for other in kitchen.things:
             if other is not thing:
                 room = np.hypot(*np.subtract(other.position[:2], place)) - KINDS[kind][0] - KINDS[other.kind][0]

@@ -44,6 +44,8 @@ EAR = 0.03
 """How far a mug's ear is beyond its radius [m]."""
 ELSEWHERE = 0.10
 """Least distance of it from where the thing stood [m]."""
+SUPPORT = 0.02
+"""Surface that is left between what stands at such a place and the counter's front edge [m]."""
 ACROSS = 0.06
 """How far beyond the middle of the robot a hand is asked to go [m]."""
 
@@ -170,7 +172,8 @@ def draw_errand(spec: TrialSpec, kitchen: KitchenLayout) -> tuple[str, Literal["
         others = [thing for thing in things if thing is not chosen]
         wide = np.array([radius(thing) + radius(chosen) for thing in others])
         there = np.array([thing.position[:2] for thing in others]).reshape(-1, 2)
-        free = spots[mirror * spots[:, 1] > -ACROSS]
+        deep = spots[:, 0] > kitchen.counter_front + radius(chosen) + SUPPORT
+        free = spots[deep & (mirror * spots[:, 1] > -ACROSS)]
         room = (np.linalg.norm(free[:, None] - there, axis=2) - wide).min(axis=1, initial=np.inf)
         room[np.linalg.norm(free - chosen.position[:2], axis=1) < ELSEWHERE] = 0.0
         if room.max() >= TIGHT:
