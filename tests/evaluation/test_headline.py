@@ -42,9 +42,11 @@ def test_a_pick_comes_to_what_it_did(rung: str) -> None:
 
 def changed(rung: str, found: golden.Record, kept: golden.Record) -> list[str]:
     """Return the names of the figures that are not as they are kept."""
-    assert found.keys() == kept.keys()
-    off: list[str] = []
+    # Another processor's last digits may bring a try more, and with it another claim.
+    off = sorted(found.keys() ^ kept.keys())
     for name, value in kept.items():
+        if name not in found:
+            continue
         if name.startswith(COUNTS):
             same = found[name] == value
         elif name in AMPLIFIED.get(rung, kept):
