@@ -18,10 +18,10 @@ import pinocchio as pin
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from tests.runtime.live.conftest import BLIND, Live
+from tests.runtime.live.test_arm_sdk import message
 
 from golem.capabilities.arms.arm_kinematics import UpperKinematics
 from golem.capabilities.arms.postures import POSTURES
-from golem.interfaces.public import WEIGHT
 from golem.middleware.dds.base import Qos
 from golem.middleware.wire import convert, hg
 from golem.stack import load_stack
@@ -33,22 +33,8 @@ AMPLITUDE: Array = np.tile([0.25, 0.12, 0.25, 0.35, 0.3, 0.2, 0.3], 2)
 """Largest way of each joint from the posture `ready` [rad]."""
 LAGS = np.arange(0, 16)
 """Delays that are tried [periods]."""
-
-
 KP, KD = np.tile([140.0] * 4 + [50.0] * 3, 2), np.tile([3.0] * 4 + [2.0] * 3, 2)
 """Of the arms' joints [N m/rad], [N m s/rad]: xr_teleoperate 1.1, H1_2_ArmController."""
-
-
-def message(weight: float, q: Array, tau: Array) -> bytes:
-    """Return a command for the joints of both arms, q (14,) [rad] with tau (14,) [N m]."""
-    payload = bytearray(hg.LOW_CMD.size)
-    payload[:4] = b"\0\1\0\0"
-    image = hg.LOW_CMD.read(payload)
-    for name, values in (("q", q), ("tau", tau), ("kp", KP), ("kd", KD)):
-        image["motor"][name][ARMS] = values
-    image["motor"]["q"][WEIGHT] = weight
-    hg.COMMAND_CHECKSUM.seal(payload)
-    return bytes(payload)
 
 
 def standing(folder: Path) -> Live:
@@ -87,7 +73,7 @@ def main(seconds: float, seed: int) -> None:
 
         def send(weight: float, q: Array) -> None:
             gravity = pin.computeGeneralizedGravity(arm.model, arm.data, np.append(0.0, q))
-            writer.write(message(weight, q, gravity[1:]))
+            writer.write(message(weight, q, tau=gravity[1:], kp=KP, kd=KD))
             live.run(PERIOD)
             measured.extend(convert.decode_low_state(s.payload).q[UPPER] for s in states.take() if s.alive)
             sent = np.array([convert.decode_low_command(s.payload, 0.0).q[ARMS] for s in reader.take() if s.alive])

@@ -82,10 +82,9 @@ def stance(edge: NearEdge, here: PlanarPose, place: Array, side: Side | None = N
     """
     across = edge.pose.to(here.to(PlanarPose(float(place[0]), float(place[1]), 0.0)))
     standoff = float(np.clip(AHEAD - across.x, *STANDOFF))
-    bounds = {"left": (-BESIDE, -BESIDE), "right": (BESIDE, BESIDE)}
     # By either hand: on the side on which the robot is already.
-    low, high = bounds[side] if side else (-BESIDE, BESIDE)
-    aside = float(np.clip(edge.pose.to(PlanarPose(0.0, 0.0, 0.0)).y - across.y, low, high))
+    aside = float(np.clip(edge.pose.to(PlanarPose(0.0, 0.0, 0.0)).y - across.y, -BESIDE, BESIDE))
+    aside = aside if side is None else BESIDE if side == "right" else -BESIDE
     return edge.pose @ PlanarPose(-standoff, across.y + aside, 0.0)
 
 

@@ -22,12 +22,16 @@ from golem.types import ARMS, LEGS, NUM_JOINTS, TICK, Array, LowCommand
 OWN = LowCommand(0.0, *(np.full(NUM_JOINTS, v) for v in (0.5, 0.0, 1.0, 100.0, 2.0)))
 
 
-def message(weight: float, q: float = -1.5, seal: bool = True) -> bytes:
+def message(
+    weight: float, q: float | Array = -1.5, seal: bool = True,
+    tau: float | Array = 0.0, kp: float | Array = 60.0, kd: float | Array = 1.5,
+) -> bytes:  # fmt: skip
     """Return a command as the vendor's examples send it: modes 0, the weight in slot 27."""
     payload = bytearray(hg.LOW_CMD.size)
     payload[:4] = b"\0\1\0\0"
     image = hg.LOW_CMD.read(payload)
-    image["motor"]["q"][ARMS], image["motor"]["kp"][ARMS], image["motor"]["kd"][ARMS] = q, 60.0, 1.5
+    for name, values in (("q", q), ("tau", tau), ("kp", kp), ("kd", kd)):
+        image["motor"][name][ARMS] = values
     image["motor"]["q"][WEIGHT] = weight
     if seal:
         hg.COMMAND_CHECKSUM.seal(payload)

@@ -225,7 +225,8 @@ class FetchRung(KitchenRung[FetchOptions]):
         at = running.stack.choice("robot").options.get("stance", (0.0, 0.0, 0.0))
         place = x + float(at[0]), y + float(at[1])
         looked = running.execute("remember", LOOK)
-        _move(robot, kitchen, after)
+        if after is not kitchen:
+            _move(robot, kitchen, after)
         watch, result = CounterWatch(running, robot, oracle, kind, True), looked
         if looked.success:
             spot = np.linalg.inv(robot.truth.T_world_odom) @ (*place, 0.0, 1.0)
