@@ -29,7 +29,7 @@ from golem.skills.fastener_list import Listed, read_list
 from golem.skills.gantry import KEEP_OFF, SILENT, Gantry
 from golem.skills.job_file import Fate, JobFault, JobFile
 from golem.skills.pack_picture import COLOURS
-from golem.skills.pack_view import SeenRim, fit_frames, matched
+from golem.skills.pack_view import SeenFasteners, SeenRim, fit_frames, matched
 from golem.skills.pick_config import PickReport, Tried
 from golem.types import PlanarPose
 
@@ -109,7 +109,7 @@ def test_what_fails_is_tried_again_from_elsewhere_and_then_set_aside(tmp_path: P
     assert "tight" in (tmp_path / "pack_inventory.html").read_text()
 
 
-def test_of_a_list_only_what_it_says_to_be_loose_is_tried_and_of_an_unknown_pack_tight_ones_once(
+def test_of_a_list_only_what_it_says_to_be_loose_is_tried_and_of_an_unknown_pack_the_others_once(
     tmp_path: Path,
 ) -> None:
     rows = [f"screw,{x},{y},{z},{int(k < 4)}" for k, (x, y, z) in enumerate(PLACES.tolist())]
@@ -119,7 +119,8 @@ def test_of_a_list_only_what_it_says_to_be_loose_is_tried_and_of_an_unknown_pack
     tight = JobWorld(PLACES, tmp_path, lambda number, tries: PickReport("tight"))
     tight.out.clear()
     ends = tight.run(DisassembleGoal(list="list.csv", job="other.sqlite", loosened="unknown")).value.fates
-    assert set(ends) == {"tight"} and len(tight.asked) == len(PLACES)
+    assert set(ends) == {"tight"} and len(tight.asked) == len(PLACES) + 4
+    assert all(tight.asked.count(k) == 2 for k in range(4))
 
 
 def test_what_was_not_seen_in_the_tray_is_lost_or_tried_again_if_it_is_still_there(tmp_path: Path) -> None:
@@ -130,17 +131,32 @@ def test_what_was_not_seen_in_the_tray_is_lost_or_tried_again_if_it_is_still_the
     assert ends[4] == Fate.LOST and ends.count(Fate.IN_TRAY) == 31
 
 
-@pytest.mark.parametrize(("kind", "fate", "times"), [("nut", Fate.LOST, 1), ("screw", Fate.MISSING, 2)])
-def test_a_stud_is_not_taken_for_the_nut_that_was_let_go(tmp_path: Path, kind: str, fate: Fate, times: int) -> None:
+class Bores(JobWorld):
+    """Its head camera takes the bore of number 4 for a fastener."""
+
+    async def see_fasteners(self, *args: Any, **more: Any) -> SeenFasteners:
+        out, self.out = self.out, self.out - {4}
+        seen = await super().see_fasteners(*args, **more)
+        self.out = out
+        return seen
+
+
+@pytest.mark.parametrize(
+    ("kind", "world", "fate", "times"),
+    [("nut", Bores, Fate.LOST, 1), ("screw", Bores, Fate.MISSING, 2), ("screw", JobWorld, Fate.LOST, 1)],
+)
+def test_what_was_let_go_and_looks_still_in_place_is_tried_again_but_a_stud_looks_like_its_nut(
+    tmp_path: Path, kind: str, world: type[JobWorld], fate: Fate, times: int
+) -> None:
     rows = [f"{kind if k == 4 else 'screw'},{x},{y},{z},1" for k, (x, y, z) in enumerate(PLACES.tolist())]
     (tmp_path / "list.csv").write_text("\n".join(["class,x,y,z,loose", *rows]))
 
     def says(number: int, tries: int) -> PickReport:
         return PickReport("picked", [], "no", "no") if number == 4 else picked(number, tries)
 
-    world = JobWorld(PLACES, tmp_path, says)
-    ends = world.run(DisassembleGoal(list="list.csv")).value.fates
-    assert ends[4] == fate and world.asked.count(4) == times
+    robot = world(PLACES, tmp_path, says)
+    ends = robot.run(DisassembleGoal(list="list.csv")).value.fates
+    assert ends[4] == fate and robot.asked.count(4) == times
 
 
 def test_what_is_in_a_tray_stays_there_whatever_a_hand_seems_to_be_at(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 
 import numpy as np
@@ -138,3 +139,17 @@ def test_plans_are_within_15_percent_of_the_best(packs: int) -> None:
     assert max(over) <= 0.15, np.round(over, 3)
     assert min(over) >= -1e-6, "the exact solver is not"
     print(np.round(over, 3))
+
+
+def test_at_a_stop_what_is_said_to_be_loose_comes_first_and_one_height_after_the_other() -> None:
+    levels, loose = [0.0, -0.13] * 5, [True] * 8 + [False] * 2
+    ones = [PackFastener(k, Listed(f"{k}", "screw", 0.03, 0.035 * k - 0.35, z, loose[k])) for k, z in enumerate(levels)]
+    sides = PackSides(np.array([one.place for one in pack(0)]))
+    stops = make_plan(sides, ones, {}, START, [-0.17, -0.11, -0.05, 0.01])
+    for stop in stops:
+        taken = [ones[number] for number, _ in stop.picks]
+        doubtful = [one.listed.loose is False for one in taken]
+        assert doubtful == sorted(doubtful)
+        of_loose = [one.listed.z for one in taken if one.listed.loose]
+        assert sum(a != b for a, b in itertools.pairwise(of_loose)) <= 1
+    assert sum(len(stop.picks) for stop in stops) == len(ones)

@@ -13,6 +13,7 @@ import pytest
 from golem.capabilities.grasping.base import Grasp, GraspMethod, Gripper, OpenLoop, ServoStatus, ServoStep
 from golem.capabilities.grasping.centroid import Centroid, CentroidConfig
 from golem.capabilities.grasping.visual_servo import VisualServo
+from golem.capabilities.planning.base import PlanRefused, Refusal
 from golem.errors import ConfigError
 from golem.interfaces import topics
 from golem.interfaces.payloads import DetectionRequest
@@ -46,6 +47,17 @@ def stocked(world: Any, thing: Any, screw: Array = SCREW, tray: Array = TRAY) ->
 def full(world: Any, thing: Any) -> Any:
     """A world with a screw and a tray."""
     return stocked(world, thing)
+
+
+def refusing(refusal: Refusal) -> Any:
+    """Return a way over an object that is always refused; its `shares` are those that were asked for."""
+
+    async def over(travel: LineTravel, side: Side, T: Array, clearance: float, share: float, speed: float) -> None:
+        over.shares.append(share)  # pyright: ignore[reportFunctionMemberAccess]
+        raise StageFailed("approach", "planner", "Not so.") from PlanRefused(refusal, "Not so.")
+
+    over.shares = list[float]()  # pyright: ignore[reportFunctionMemberAccess]
+    return over
 
 
 def picked(
@@ -519,6 +531,37 @@ def test_a_bore_that_still_looks_taken_is_reported(full: Any) -> None:
     result = picked(full)
     assert result.success and "still looks taken" in result.reason
     assert (result.value.in_tray, result.value.bore_empty) == ("unknown", "no")
+
+
+def test_a_neighbour_3_cm_beside_does_not_make_an_empty_bore_look_taken(full: Any, thing: Any) -> None:
+    beside = SCREW + (0.0, 0.03, 0.0)
+
+    def seen() -> list[LocalizedObject]:
+        left = [beside] if "place" in full.stages and not full.holds else [SCREW, beside]
+        return [*(thing("screw", one + HEAD_ERROR, full.t) for one in left), thing("tray", TRAY + HEAD_ERROR, full.t)]
+
+    full.objects["head"] = seen
+    result = picked(full, wanted=tuple((SCREW + HEAD_ERROR)[:2].tolist()))
+    assert result.value.bore_empty == "yes"
+
+
+@pytest.mark.parametrize("refusal", [Refusal.GOAL, Refusal.UNREACHABLE])
+def test_a_turn_from_which_the_way_down_is_straight_comes_first(full: Any, monkeypatch: Any, refusal: Refusal) -> None:
+    tried = list[tuple[float, float]]()
+    over = LineTravel.over
+
+    async def some(travel: LineTravel, side: Side, T: Array, clearance: float, share: float, speed: float) -> None:
+        tried.append((share, float(np.arctan2(T[1, 0], T[0, 0]))))
+        if share > 0.9 and tried[-1][1] != tried[0][1] or share < 0.6:
+            return await over(travel, side, T, clearance, share, speed)
+        raise StageFailed("approach", "planner", "Not so.") from PlanRefused(refusal, "Not so.")
+
+    monkeypatch.setattr(LineTravel, "over", some)
+    assert picked(full).success
+    assert [share for share, _ in tried] == [1.0, 1.0] and tried[0][1] != tried[1][1]
+    monkeypatch.setattr(LineTravel, "over", never := refusing(refusal))
+    failed(picked(full), "approach", "planner", "Not so", "blocked" if refusal is Refusal.GOAL else "out_of_reach")
+    assert len(never.shares) == (9 if refusal is Refusal.GOAL else 3)
 
 
 @pytest.mark.parametrize("share", np.linspace(0.0, 0.99, 12))

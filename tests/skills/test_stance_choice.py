@@ -61,3 +61,12 @@ def test_a_low_pack_is_worked_at_from_lower_and_a_nominal_one_is_not() -> None:
     assert best.drop > 0.05 and best.quality > best_stance(EDGE, low, WANTED, tray).quality
     nominal = best_stance(EDGE, SCREWS, WANTED, TRAY, drops)
     assert nominal == best_stance(EDGE, SCREWS, WANTED, TRAY)
+
+
+def test_a_robot_stays_as_high_as_it_stands_where_another_height_wins_little_and_goes_by_the_hand_it_uses() -> None:
+    drops = (-0.06, 0.0, 0.06)  # its own height is 6 cm above
+    assert stance_here(SCREWS, WANTED, TRAY, drops).drop == 0.0
+    assert stance_here(SCREWS, WANTED, TRAY, (0.0, -0.06, 0.06)).drop == 0.0
+    left = SCREWS * (1.0, -1.0, 1.0)
+    assert stance_here(left, WANTED, None, drops, ("left",)).served > 0
+    assert stance_here(left - (0.0, 0.25, 0.0), WANTED, None, drops, ("left",)).quality < 1.0

@@ -28,7 +28,8 @@ class DisassembleGoal:
         job: the file that keeps what was done, `.sqlite`, in that folder; a job that is there is gone on with. Empty:
             called as the list.
         loosened: which of the list are loose: `all`; those that the `list` says, no others being tried; those that a
-            `gantry` beside the robot is done with; or `unknown`: one that is tight is not tried again.
+            `gantry` beside the robot is done with; or `unknown`: each is tried, and one that is tight is tried again
+            only if the list says that it is loose.
         side: of the pack at which the robot stands when it begins or goes on.
         screws, nuts: classes of what screws and nuts are put into; the next one where one is full.
     """

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from golem.capabilities.navigation.base import NavInputs
@@ -23,6 +23,8 @@ TIMEOUT = 30.0
 """Time that one approach may take [s]."""
 APPROACH = GoToConfig(speed=(0.2, 0.15, 0.3), face=5.0)
 """Slow, and always facing as it will stand."""
+STEPS = replace(APPROACH, accept=0.05, straight=0.06, settle=1.0, rest=0.3)
+"""The same for who sees after each stop, better than the odometry does, by how much it missed."""
 
 
 async def approach(context: Context, navigator: GoTo, target: PlanarPose) -> None:

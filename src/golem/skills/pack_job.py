@@ -12,13 +12,13 @@ from golem.interfaces.memory_payloads import ShownPicture
 from golem.skills.base import FAULT, REFUSED, SkillResult, StageFailed
 from golem.skills.context import Context
 from golem.skills.disassemble_goal import DisassembleGoal, DisassembleReport
-from golem.skills.dock import APPROACH, SETTLE, DockReport, approach
+from golem.skills.dock import SETTLE, STEPS, DockReport, approach
 from golem.skills.fastener_list import KINDS, Listed
 from golem.skills.gantry import KEEP_OFF, Gantry
 from golem.skills.job_file import TO_DO, Fate, JobFile, PackFastener
 from golem.skills.navigate import NavigateGoal
 from golem.skills.pack_picture import pack_picture
-from golem.skills.pack_plan import PackSides, PackStop, make_plan
+from golem.skills.pack_plan import PackSides, PackStop, make_plan, stands_well
 from golem.skills.pack_view import NOTHING, SeenRim, fit_frames, matched, see_edge, see_fasteners
 from golem.skills.pick_config import PickGoal, PickOutcome, PickReport, Sight
 from golem.skills.pick_targets import WANTED
@@ -45,8 +45,6 @@ BESIDE = 1.0
 """A stance this near is gone to straight along the edge [m]."""
 BACK = 0.35
 """How far the robot steps back before it walks elsewhere [m]."""
-THERE = (0.04, 0.06)
-"""How near to its stance the robot stands well [m, rad]: it plans with more room than that."""
 APPROACHES = 3
 """How often it steps there, seeing better where the pack is each time."""
 STAGE = 0.75
@@ -261,31 +259,32 @@ class PackJob:
         """Bring the robot to a stop, and find the pack anew from there; returns whether something is within reach."""
         context, target = self._context, self._T_odom_pack @ stop.pose
         here = PlanarPose.of(context.legs.pose)
-        left = here.to(target)
+        left, navigator, found = here.to(target), GoTo(STEPS), DockReport()
         if math.hypot(left.x, left.y) < BESIDE and abs(left.yaw) < 0.5:
-            await approach(context, GoTo(APPROACH), target)
+            if not stands_well(left):
+                await approach(context, navigator, target)
         else:
             if self._sides.away(self._T_pack_base) < STAGE:
-                await approach(context, GoTo(APPROACH), here @ PlanarPose(-BACK, 0.0, 0.0))
+                await approach(context, navigator, here @ PlanarPose(-BACK, 0.0, 0.0))
             stage = target @ PlanarPose(-STAGE, 0.0, 0.0)
             walked = await context.run("navigate", NavigateGoal(stage.x, stage.y, stage.yaw, "odom", content=CONTENT))
             if not walked.success:
                 context.say(walked.stage, walked.reason, failed=True)
                 return False
-        navigator, found = GoTo(APPROACH), DockReport()
         while True:
             await context.sleep(SETTLE)
             for label in sorted({one.label for one, _ in ones}):
                 await self._find_again(label, self._container(label))
             left = self._T_pack_base.to(stop.pose)
-            found.left, away = (left.x, left.y, left.yaw), math.hypot(left.x, left.y)
-            if (away < THERE[0] and abs(left.yaw) < THERE[1]) or found.approaches == APPROACHES:
+            found.left = (left.x, left.y, left.yaw)
+            if stands_well(left) or found.approaches == APPROACHES:
                 break
             await approach(context, navigator, self._T_odom_pack @ stop.pose)
             found.approaches += 1
         found.served = sum(self._reaches(one, side) for one, side in ones)
         self.report.docks.append(found)
-        context.say("look", f"{100 * away:.1f} cm from the stance, {found.served} of {len(ones)} within reach.")
+        away = 100.0 * math.hypot(left.x, left.y)
+        context.say("look", f"{away:.1f} cm from the stance, {found.served} of {len(ones)} within reach.")
         return bool(found.served)
 
     async def _find_again(self, label: str, container: str) -> None:
@@ -338,12 +337,13 @@ class PackJob:
         if taken is not one:
             await self._tell(one, Fate.OPEN, f"A hand came to {taken.listed.name} instead.")
         out = result.success and taken.label == "nut"  # where it was, a stud looks like it
-        tries = 1 if outcome is PickOutcome.TIGHT and self._goal.loosened == "unknown" else TRIES
+        believed = outcome is PickOutcome.TIGHT and self._goal.loosened == "unknown" and not taken.listed.loose
+        tries = 1 if believed else TRIES
         if result.success and found.in_tray != Sight.NO:
             fate, self.report.picked = Fate.IN_TRAY, self.report.picked + 1
         elif outcome is PickOutcome.TRAY_FULL:
             self._full.add(name)
-        elif outcome in (PickOutcome.PICKED, PickOutcome.SLIPPED) and (out or found.bore_empty != Sight.NO):
+        elif result.success or (outcome is PickOutcome.SLIPPED and found.bore_empty != Sight.NO):
             reason = f"It was let go and is not seen in the {name}." if result.success else reason
             await self._tell(taken, Fate.UNSETTLED, reason, side)
             if out or not await self._still_there(taken):

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from golem.skills.job_file import PackFastener
-from golem.skills.stance_choice import LOOK_TURN, OVER_TRAY, VIEWS, seen_from, takes, within_reach
+from golem.skills.stance_choice import GOOD, LOOK_TURN, OVER_TRAY, VIEWS, seen_from, takes, within_reach
 from golem.types import SIDES, Array, PlanarPose, Side
 
 INSET = 0.022
@@ -40,6 +40,8 @@ BARRED = (0.12, 0.3)
 """A stance this near to one from which a fastener was not taken is the same [m, rad]."""
 BEGINNINGS = 64
 """Greedy beginnings, of which one in four goes by the gain alone, and the others the more by the way."""
+THERE = (0.04, 0.06)
+"""How near to its stance the robot stands well [m, rad]: plans have more room than that."""
 SPREAD = 0.5
 """How much what a stance gains is varied between them, as a share."""
 
@@ -126,7 +128,8 @@ def make_plan(
     if not poses or not wanted:
         return []
     places = np.array([(p.x, p.y, p.yaw) for p in poses])
-    quality = np.max([_quality(places, wanted, containers, rim) for rim in rims], axis=0)
+    at_rims = np.array([_quality(places, wanted, containers, rim) for rim in rims])
+    quality = at_rims.max(axis=0)
     for f, one in enumerate(wanted):
         for stance, hand in one.barred:
             gone = [stance.to(p) for p in poses]
@@ -143,7 +146,9 @@ def make_plan(
     for k, s in enumerate(chosen):
         mine = [f for f in range(len(wanted)) if owner[:, f].max() > 0.0 and int(owner[:, f].argmax()) == k]
         hands: dict[int, Side] = {f: SIDES[int(quality[:, s, f].argmax())] for f in mine}
-        mine.sort(key=lambda f: (hands[f], poses[s].to(PlanarPose(wanted[f].listed.x, wanted[f].listed.y, 0.0)).y))
+        across = {f: poses[s].to(PlanarPose(wanted[f].listed.x, wanted[f].listed.y, 0.0)).y for f in mine}
+        good = {f: at_rims[:, SIDES.index(hands[f]), s, f] >= GOOD * quality[SIDES.index(hands[f]), s, f] for f in mine}
+        mine.sort(key=lambda f: (wanted[f].listed.loose is False, int(good[f].argmax()), hands[f], across[f]))
         way = abs(math.remainder(ring[s] - at, sides.length))
         if mine:
             stops.append(PackStop(poses[s], tuple((wanted[f].number, hands[f]) for f in mine), way))
@@ -238,3 +243,8 @@ def way(places: Array, start: float, length: float) -> tuple[Array, NDArray[np.i
         first, rest = order[:gap], order[gap:][::-1]
         order = np.concatenate([first, rest] if forth[gap] <= back[gap] else [rest, first])
     return total.min(axis=-1), order
+
+
+def stands_well(left: PlanarPose) -> bool:
+    """Return whether a robot stands near enough to its stance that has `left` to go."""
+    return math.hypot(left.x, left.y) < THERE[0] and abs(left.yaw) < THERE[1]

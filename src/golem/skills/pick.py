@@ -6,26 +6,29 @@ import math
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
 from golem.capabilities.grasping.base import Grasp, GraspMethod, SeeingLaw, ServoLaw, ServoStatus, ServoStep
+from golem.capabilities.planning.base import Refusal
 from golem.capabilities.policies.observer import Observer
 from golem.interfaces import topics
 from golem.interfaces.payloads import GripState
 from golem.skills.base import SkillCancelled, SkillResult, StageFailed
+from golem.skills.body_interface import CLOSE
 from golem.skills.context import Context
 from golem.skills.finger_room import FingerRoom
 from golem.skills.force_guard import CLOSED, ForceGuard
 from golem.skills.hand_offset import learn_offset, made_up
 from golem.skills.pack_view import see_fasteners
-from golem.skills.pick_config import PickConfig, PickFailed, PickGoal, PickOutcome, PickReport, Sight, outcome_of
+from golem.skills.pick_config import PickConfig, PickFailed, PickGoal, PickOutcome, PickReport, outcome_of, refusal_of
 from golem.skills.pick_place import LEAD, look_after, place, pull, set_back
 from golem.skills.pick_targets import SAME, Attempt, PickChoice, TargetChoice, called, names_of
 from golem.skills.poses import floor_places, lifted, moved, stands_at
 from golem.skills.stance_choice import stance_here
 from golem.skills.travel import LineTravel, PlannedTravel, Travel
-from golem.types import Array, LocalizedObject, Side
+from golem.types import SIDES, Array, LocalizedObject, Side
 
 FINAL = (PickOutcome.TIGHT, PickOutcome.OUT_OF_REACH)
 """What a second try with the same hand would not change."""
@@ -34,6 +37,8 @@ SETTLED = (*FINAL, PickOutcome.JAMMED)
 EXPECTED = (0.03, 0.03, 0.045)
 """How far along x, y, z an object may be from where a palm camera is known to show it [m]: two of a real pack are 34 mm
 apart, or one is 65 mm lower than the other."""
+STRAIGHT = (1.0, 0.5, 0.0)
+"""Shares of the way down that are to be straight, the best first."""
 SURE = 0.003
 """Uncertainty of the servo's target below which the object was seen [m]."""
 
@@ -102,7 +107,7 @@ class Pick:
             await self._travel.home(side, self._config.travel_speed)
         if result.success:
             await look_after(context, self._config, attempt, choice, self._names, self._report)
-            result = replace(result, reason=f"{result.reason[:-1]}{_seen(self._report)}.")
+            result = replace(result, reason=f"{result.reason[:-1]}{self._report.seen}.")
             context.say("done", result.reason)
         return replace(result, value=self._report)
 
@@ -112,8 +117,9 @@ class Pick:
             return
         avoid, *marks = (floor_places("a pick", places) for places in (goal.avoid, goal.wanted, goal.container_at))
         seen = await see_fasteners(context, goal.label, goal.container, avoid, True, *marks)
-        stance = stance_here(seen.places, seen.weights, seen.tray, drops)
-        if stance.served and stance.drop:
+        sides = SIDES if goal.side == "either" else (goal.side,)
+        stance = stance_here(seen.places, seen.weights, seen.tray, drops, sides)
+        if stance.served and abs(stance.drop) > CLOSE:
             text = f"Standing {100.0 * abs(stance.drop):.0f} cm {'lower' if stance.drop > 0.0 else 'higher'}"
             context.say("stand", f"{text}, where {stance.served} are in reach.")
             with suppress(StageFailed):
@@ -192,19 +198,40 @@ class Pick:
 
     async def _approach(self, context: Context, attempt: Attempt) -> Grasp:
         """Bring the open hand over the object, turned as it can be: first across, where else a finger has no room."""
-        refused, best = list[StageFailed](), context.heading + self._config.heading(attempt.side)
-        headings = [best + turn for turn in self._config.turns]
-        for yaw in (*([] if self._across is None else (self._across, self._across - math.pi)), *headings):
-            grasps = await context.propose(self._method, self._aim(attempt), attempt.side, yaw)
-            if not grasps:
-                raise StageFailed("approach", "grasp_method", f"No grasp was proposed for the {attempt.label}.")
+        if self._across is not None:
+            with suppress(StageFailed):
+                return await self._over(context, attempt, (self._across, self._across - math.pi))
+        best = context.heading + self._config.heading(attempt.side)
+        return await self._over(context, attempt, tuple(best + turn for turn in self._config.turns))
+
+    async def _over(self, context: Context, attempt: Attempt, yaws: Sequence[float]) -> Grasp:
+        """Bring the open hand over the object at one of `yaws` [rad]: where the way down is straight, or half of it.
+
+        The head camera may be off by half of the way, so what it says of the far end is no reason not to go and look.
+        """
+        grasps, refused = dict[float, Grasp](), dict[float, StageFailed]()
+        for share, yaw in product(STRAIGHT, yaws):
+            if yaw not in grasps:
+                grasps[yaw] = await self._propose(context, attempt, yaw)
+            elif refusal_of(refused[yaw]) is not Refusal.GOAL:
+                continue
             try:
-                await self._over(context, attempt, grasps[0])
+                T = grasps[yaw].T_odom_gripper
+                await self._travel.over(attempt.side, T, self._config.clearance, share, self._config.travel_speed)
+                return grasps[yaw]
             except StageFailed as failure:
-                refused.append(failure)
-            else:
-                return grasps[0]
-        raise refused[0]
+                refused[yaw] = failure
+        raise refused[yaws[0]]
+
+    async def _propose(self, context: Context, attempt: Attempt, yaw: float) -> Grasp:
+        """Return the best grasp at `yaw` [rad], the hand opened for it."""
+        grasps = await context.propose(self._method, self._aim(attempt), attempt.side, yaw)
+        if not grasps:
+            raise StageFailed("approach", "grasp_method", f"No grasp was proposed for the {attempt.label}.")
+        target, count = grasps[0].T_odom_gripper[:3, 3].tolist(), len(self._report.tried)
+        context.say("approach", "Bringing the hand over it.", target=target, side=attempt.side, attempt=count)
+        context.hands[attempt.side].open(grasps[0].gap)
+        return grasps[0]
 
     async def _learn(self, context: Context, attempt: Attempt) -> None:
         """Learn what the hand's own camera is off by, where one object is wanted and may be taken for its neighbour."""
@@ -226,13 +253,6 @@ class Pick:
         within = EXPECTED if self._sure else (np.inf, np.inf, EXPECTED[2] if self._goal.level else np.inf)
         mine = [one for one in seen if (np.abs(one.position - aim) < within).all()]
         return [called(one, attempt.label) for one in mine]
-
-    async def _over(self, context: Context, attempt: Attempt, grasp: Grasp) -> None:
-        T = grasp.T_odom_gripper
-        target, count = T[:3, 3].tolist(), len(self._report.tried)
-        context.say("approach", "Bringing the hand over it.", target=target, side=attempt.side, attempt=count)
-        context.hands[attempt.side].open(grasp.gap)
-        await self._travel.over(attempt.side, lifted(T, self._config.clearance), T, self._config.travel_speed)
 
     async def _take(self, context: Context, attempt: Attempt, grasp: Grasp, timings: dict[str, float]) -> None:
         """Grasp and pull out. A method that looks again may try again; an open-loop one would only repeat itself."""
@@ -256,18 +276,16 @@ class Pick:
                 await self._back_off(context, attempt.side, grasp.gap)
                 if last:
                     raise
-                if self._across is not None:
+                if self._across is not None or not await self._above_again(context, attempt, grasp, failure.stage):
                     grasp = await self._approach(context, attempt)
-                else:
-                    await self._above_again(context, attempt, grasp, failure.stage)
 
-    async def _above_again(self, context: Context, attempt: Attempt, grasp: Grasp, stage: str) -> None:
-        """Bring the hand straight above the object again, or, where it cannot keep to the line, around."""
+    async def _above_again(self, context: Context, attempt: Attempt, grasp: Grasp, stage: str) -> bool:
+        """Bring the hand straight above the object again; returns whether it can keep to the line."""
         above = lifted(grasp.T_odom_gripper, self._config.clearance)
-        try:
+        with suppress(StageFailed):
             await self._travel.line(attempt.side, above, self._config.travel_speed, stage)
-        except StageFailed:
-            await self._over(context, attempt, grasp)
+            return True
+        return False
 
     async def _descend(self, context: Context, attempt: Attempt, grasp: Grasp) -> None:
         """Open loop: go straight down to the grasp as proposed, and close."""
@@ -380,12 +398,3 @@ def followed(seen: Array | None, step: ServoStep) -> Array | None:
 def _hands(goal: PickGoal, tried: Sequence[Attempt]) -> list[Side]:
     """Return the hand of the goal, or those of the attempts, each once."""
     return list(dict.fromkeys(attempt.side for attempt in tried)) if goal.side == "either" else [goal.side]
-
-
-def _seen(report: PickReport) -> str:
-    words = {
-        Sight.YES.value: ", and is seen there",
-        Sight.NO.value: ", but is not seen there",
-        Sight.UNKNOWN.value: "",
-    }[report.in_tray]
-    return words + ("; its place still looks taken" if report.bore_empty == Sight.NO else "")

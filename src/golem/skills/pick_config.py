@@ -90,6 +90,13 @@ class PickReport:
     bore_empty: str = Sight.UNKNOWN.value
     off: tuple[float, ...] = ()
 
+    @property
+    def seen(self) -> str:
+        """Say what the head camera saw, as the end of a sentence."""
+        words = {Sight.YES.value: ", and is seen there", Sight.NO.value: ", but is not seen there"}
+        bore = "; its place still looks taken" if self.bore_empty == Sight.NO else ""
+        return words.get(self.in_tray, "") + bore
+
 
 class PickFailed(StageFailed):
     """A stage of a pick failed, and what that says of the object or the work place is known."""
@@ -113,9 +120,14 @@ def outcome_of(failure: StageFailed) -> PickOutcome:
     """Return what a failure says."""
     if isinstance(failure, PickFailed):
         return failure.outcome
-    if isinstance(failure.__cause__, PlanRefused):
-        return _REFUSED.get(failure.__cause__.refusal, PickOutcome.FAILED)
-    return PickOutcome.FAILED
+    refusal = refusal_of(failure)
+    return PickOutcome.FAILED if refusal is None else _REFUSED.get(refusal, PickOutcome.FAILED)
+
+
+def refusal_of(failure: StageFailed) -> Refusal | None:
+    """Return why the motion of a stage was refused; None where something else failed."""
+    cause = failure.__cause__
+    return cause.refusal if isinstance(cause, PlanRefused) else None
 
 
 def slipped(heights: list[float]) -> PickOutcome:

@@ -7,15 +7,16 @@ from contextlib import suppress
 from itertools import product
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from golem.capabilities.planning.base import PlanRefused, Refusal
+from golem.capabilities.planning.base import Refusal
 from golem.interfaces.payloads import GripState
 from golem.skills.base import StageFailed
 from golem.skills.context import Context
 from golem.skills.force_guard import ForceGuard
 from golem.skills.hand_offset import shift_of
-from golem.skills.pick_config import PickConfig, PickFailed, PickOutcome, PickReport, Sight, slipped
+from golem.skills.pick_config import PickConfig, PickFailed, PickOutcome, PickReport, Sight, refusal_of, slipped
 from golem.skills.pick_targets import Attempt, HandReach, PickChoice, positions
 from golem.skills.poses import lifted, moved, turned
 from golem.skills.travel import Travel
@@ -111,9 +112,8 @@ async def place(
     try:
         await travel.carry(attempt.side, goals, config.travel_speed)
     except StageFailed as failure:
-        cause = failure.__cause__
-        if isinstance(cause, PlanRefused) and cause.refusal is Refusal.UNREACHABLE:
-            raise PickFailed(PickOutcome.TRAY_OUT_OF_REACH, failure.stage, failure.slot, str(failure)) from cause
+        if refusal_of(failure) is Refusal.UNREACHABLE:
+            raise PickFailed(PickOutcome.TRAY_OUT_OF_REACH, failure.stage, failure.slot, str(failure)) from failure
         raise
     await _nearer(context, config, travel, attempt, container.sighting.position[:2] + shift[:2])
     if not hand.status.holding:
@@ -214,13 +214,15 @@ async def look_after(
             report.in_tray = (Sight.YES if gained or 2 * sum(more) > len(more) else Sight.NO).value
     taken = report.tried[-1]
     stood = choice.seen[~inside]
-    around = stood[np.hypot(stood[:, 0] - taken.x, stood[:, 1] - taken.y) < NEAR]
-    if len(around):
+    around = np.hypot(stood[:, 0] - taken.x, stood[:, 1] - taken.y) < NEAR
+    if around.any():
         # In single frames a bore looks like a screw, or a screw is overlooked.
-        shown = [sum(_shows(points, one) for points in frames) for one in around]
-        report.bore_empty = (Sight.YES if 2 * min(shown) < len(frames) else Sight.NO).value
+        shown = np.sum([_shown(points, stood) for points in frames], axis=0)[around]
+        report.bore_empty = (Sight.YES if 2 * shown.min() < len(frames) else Sight.NO).value
 
 
-def _shows(points: Array, one: Array) -> bool:
-    """Return whether an object (3,) is among those (n, 3) of a frame."""
-    return bool((np.linalg.norm(points - one, axis=1) < SAME).any())
+def _shown(points: Array, stood: Array) -> NDArray[np.bool_]:
+    """Return (n,) which of what `stood` (n, 3) is among those (m, 3) of a frame; each of these is the nearest one."""
+    away = np.linalg.norm(points[:, None] - stood, axis=2)
+    nearest = away == away.min(axis=1, keepdims=True)
+    return (nearest & (away < SAME)).any(axis=0)

@@ -61,9 +61,15 @@ class PackStance:
     drop: float = 0.0
 
 
-def stance_here(screws: Array, weights: Array, tray: Array | None, drops: Sequence[float] = (0.0,)) -> PackStance:
-    """Return how well the robot stands where it is; see `best_stance`."""
-    return _best([PlanarPose(0.0, 0.0, 0.0)], screws, weights, tray, drops)
+def stance_here(
+    screws: Array, weights: Array, tray: Array | None, drops: Sequence[float] = (0.0,), sides: Sequence[Side] = SIDES
+) -> PackStance:
+    """Return how well the robot stands where it is, for one of the hands `sides`; see `best_stance`.
+
+    The height of now is kept where another wins little: each change takes 2 to 3 s.
+    """
+    here, now = [PlanarPose(0.0, 0.0, 0.0)], min(drops, key=abs)
+    return _best(here, screws, weights, tray, sorted(drops, key=lambda drop: drop != now), sides)
 
 
 def best_stance(
@@ -89,7 +95,12 @@ def best_stance(
 
 
 def _best(
-    tried: Sequence[PlanarPose], screws: Array, weights: Array, tray: Array | None, drops: Sequence[float]
+    tried: Sequence[PlanarPose],
+    screws: Array,
+    weights: Array,
+    tray: Array | None,
+    drops: Sequence[float],
+    sides: Sequence[Side] = SIDES,
 ) -> PackStance:
     """Return the best of the poses `tried`, at the best height."""
     stances = np.array([(p.x, p.y, p.yaw) for p in tried])
@@ -97,7 +108,7 @@ def _best(
     found: list[tuple[float, PackStance]] = []
     for drop in drops:
         up = np.array([0.0, 0.0, drop])
-        quality, served = _judged(stances, screws + up, weights, None if tray is None else tray + up)
+        quality, served = _judged(stances, screws + up, weights, None if tray is None else tray + up, sides)
         best = int(np.argmax(quality - cost))
         stance = PackStance(tried[best], float(quality[best]), int(served[best]), drop)
         found.append((float(quality[best] - cost[best] - PER_METRE * abs(drop - drops[0])), stance))
@@ -105,11 +116,13 @@ def _best(
     return (found[0] if found[0][0] >= GOOD * most[0] else most)[1]
 
 
-def _judged(stances: Array, screws: Array, weights: Array, tray: Array | None) -> tuple[Array, Array]:
+def _judged(
+    stances: Array, screws: Array, weights: Array, tray: Array | None, sides: Sequence[Side]
+) -> tuple[Array, Array]:
     """Return the (s,) quality of stances (s, 3), and how many fasteners each serves."""
     best = np.zeros((len(stances), len(screws)))
     seen = seen_from(stances, screws, 0.0)
-    for side in SIDES:
+    for side in sides:
         room = takes(stances, screws, side)
         if tray is not None:
             room = room * within_reach(stances, (tray + (0.0, 0.0, OVER_TRAY))[None], side)

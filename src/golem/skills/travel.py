@@ -12,7 +12,7 @@ from golem.capabilities.arms.postures import posture
 from golem.capabilities.planning.base import Held, PlanRefused, Refusal
 from golem.skills.base import StageFailed
 from golem.skills.context import Context
-from golem.skills.poses import at_height
+from golem.skills.poses import at_height, lifted
 from golem.types import SIDES, Array, Side
 
 SPARED = 0.06
@@ -48,8 +48,16 @@ class Travel(Protocol):
         """Take what was seen for being elsewhere by `by` (3,) in odom [m]."""
         ...
 
-    async def over(self, side: Side, T_above: Array, T_object: Array, speed: float) -> None:
-        """Bring an empty hand to where it can go straight to `T_object` and up again. Raises StageFailed: it cannot."""
+    async def over(self, side: Side, T_object: Array, clearance: float, share: float, speed: float) -> None:
+        """Bring an empty hand above an object, to where it can go down straight. Raises StageFailed: it cannot.
+
+        Args:
+            side: which hand.
+            T_object: of the grasp.
+            clearance: how high above it [m].
+            share: of the way down that has to be straight, from 0 to 1.
+            speed: of the hand [m/s].
+        """
         ...
 
     async def carry(self, side: Side, goals: Sequence[Array], speed: float) -> None:
@@ -88,9 +96,9 @@ class LineTravel:
     def displace(self, by: Array) -> None:
         """Nothing was seen."""
 
-    async def over(self, side: Side, T_above: Array, T_object: Array, speed: float) -> None:
+    async def over(self, side: Side, T_object: Array, clearance: float, share: float, speed: float) -> None:
         """Go up, across and down; see `Travel`."""
-        await self._go(side, T_above, speed)
+        await self._go(side, lifted(T_object, clearance), speed)
 
     async def carry(self, side: Side, goals: Sequence[Array], speed: float) -> None:
         """Go up, across and down to the first; see `Travel`."""
@@ -149,24 +157,13 @@ class PlannedTravel:
         """Move the cloud; see `Travel`."""
         self._motion.displace(by)
 
-    async def over(self, side: Side, T_above: Array, T_object: Array, speed: float) -> None:
-        """Go there in a posture from which the way down is straight, or half of it, or at last in any; see `Travel`.
-
-        The head camera may be off by half of the way, so what it says of the far end is no reason not to go and look.
-        """
+    async def over(self, side: Side, T_object: Array, clearance: float, share: float, speed: float) -> None:
+        """Go there in a posture from which the way down is straight; see `Travel`."""
         from golem.skills.planned_motion import Then
 
-        half = T_object.copy()
-        half[:3, 3] = 0.5 * (T_above[:3, 3] + T_object[:3, 3])
-        for end in (T_object, half):
-            try:
-                then = [Then(side, end, speed, APPROACH)]
-                return await self._to("approach", side, T_above, speed, then=then, near=OVER)
-            except StageFailed as failure:
-                cause = failure.__cause__
-                if not (isinstance(cause, PlanRefused) and cause.refusal is Refusal.GOAL):
-                    raise
-        await self._to("approach", side, T_above, speed, near=OVER)
+        end = lifted(T_object, (1.0 - share) * clearance)
+        then = [Then(side, end, speed, APPROACH)] if share else []
+        await self._to("approach", side, lifted(T_object, clearance), speed, then=then, near=OVER)
 
     async def carry(self, side: Side, goals: Sequence[Array], speed: float) -> None:
         """Go around what is in the way of the hand and of the screw; see `Travel`."""

@@ -26,7 +26,7 @@ from golem.robots.mujoco.scene import Scene
 from golem.robots.worlds.conditions import REACH_Y, LayoutKind
 from golem.robots.worlds.layout import KINDS, PackLayout
 from golem.skills.disassemble import JOB, Disassemble
-from golem.skills.disassemble_goal import DisassembleGoal, DisassembleReport
+from golem.skills.disassemble_goal import DisassembleGoal, DisassembleReport, Loosened
 from golem.skills.job_file import Fate
 from golem.skills.kept_file import KeptFileConfig
 from golem.skills.pick_config import PickGoal
@@ -44,7 +44,7 @@ TIP = 0.03
 LOOK = 0.2
 """Time between two looks at where the robot is [s]."""
 UNCLAIMED = "unclaimed"
-"""What became of a loosened fastener that the gantry calls tight: nobody asks for it."""
+"""What became of a loosened fastener that the gantry calls tight, and that nobody asked for."""
 BLAME = {
     Fate.MISSING.value: "localizer",
     Fate.NOT_FOUND.value: "localizer",
@@ -95,6 +95,11 @@ class WholePackRung(VarStandRung):
     def _goal(self) -> PickGoal:
         return PickGoal(side="either")
 
+    @property
+    def _loosened(self) -> Loosened:
+        """What is tried: of a whole pack everything, since some of what the list calls tight is loose."""
+        return "gantry" if self.options.gantry else "unknown" if self.options.part == "whole" else "list"
+
     def cases(self, results: Results) -> Sequence[Case]:
         """Return the values of the sweep; see `Rung`."""
         return self._sweep
@@ -131,7 +136,7 @@ class WholePackRung(VarStandRung):
                     return min(touches.due(), contacts.due(), due, gantry.due if gantry else math.inf)
 
                 start = episode.t
-                goal = DisassembleGoal(list="pack.csv", loosened="gantry" if self.options.gantry else "list")
+                goal = DisassembleGoal(list="pack.csv", loosened=self._loosened)
                 visits = [(claim_name(slot), place_above(scene.layout, slot)) for slot, claimed in claims if claimed]
                 gantry = GantryCell(robot, episode.running.bus, visits, start) if self.options.gantry else None
                 episode.start(Disassemble(KeptFileConfig(folder.name)), goal)
@@ -211,7 +216,8 @@ def judged(claims: Sequence[tuple[int, bool]], fates: Sequence[Fate], found: Seq
     """Return what became of the loosened fasteners, and which of the robot's words are wrong, as figures."""
     there = {one.slot: one.where == "tray" for one in found if one.loose}
     said = {slot: (claimed, fate) for (slot, claimed), fate in zip(claims, fates, strict=True)}
-    lost = Counter(said[s][1].value if said[s][0] else UNCLAIMED for s, inside in there.items() if not inside)
+    asked = {s for s, (claimed, fate) in said.items() if claimed or fate is not Fate.OPEN}
+    lost = Counter(said[s][1].value if s in asked else UNCLAIMED for s, inside in there.items() if not inside)
     wrong = [fate for slot, (claimed, fate) in said.items() if claimed and slot not in there]
     missed = [slot for slot, inside in there.items() if not inside and said[slot][0]]
     boasts = [slot for slot, (_, fate) in said.items() if fate is Fate.IN_TRAY and not there.get(slot, False)]
