@@ -533,6 +533,29 @@ def test_a_bore_that_still_looks_taken_is_reported(full: Any) -> None:
     assert (result.value.in_tray, result.value.bore_empty) == ("unknown", "no")
 
 
+@pytest.mark.parametrize("aside", [0.004, np.inf])
+def test_a_hand_whose_fingers_close_stays_whatever_is_seen_of_what_they_hide(
+    full: Any, thing: Any, aside: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tests.skills.conftest.FINGER_TICKS", 200)
+    there, step = list[Array](), full.step
+
+    def closing() -> bool:
+        return full.stages[-1:] == ["grasp"]
+
+    def seen() -> list[LocalizedObject]:
+        off = aside if closing() else 0.0
+        return [thing("screw", SCREW + (off, 0.0, 0.0), full.t)] if np.isfinite(off) else []
+
+    def watched() -> None:
+        step()
+        there.extend(full.sent[-1:] if closing() else ())
+
+    full.objects["right_hand"], full.step = seen, watched
+    assert picked(full, config=replace(CONFIG, close_timeout=2.5)).success
+    assert len(there) > 3 and np.ptp(there, axis=0).max() < 1e-4
+
+
 def test_a_neighbour_3_cm_beside_does_not_make_an_empty_bore_look_taken(full: Any, thing: Any) -> None:
     beside = SCREW + (0.0, 0.03, 0.0)
 

@@ -14,7 +14,6 @@ from golem.capabilities.grasping.base import Grasp, GraspMethod, SeeingLaw, Serv
 from golem.capabilities.planning.base import Refusal
 from golem.capabilities.policies.observer import Observer
 from golem.interfaces import topics
-from golem.interfaces.payloads import GripState
 from golem.skills.base import SkillCancelled, SkillResult, StageFailed
 from golem.skills.body_interface import CLOSE
 from golem.skills.context import Context
@@ -295,24 +294,23 @@ class Pick:
         left = await arm.settle(self._config.tolerance, 2.0)
         if left > 2.0 * self._config.tolerance:
             raise StageFailed("descend", "localizer", f"The hand was stopped {left * 1e3:.0f} mm before the grasp.")
-        self._close(context, attempt)
-        hand = context.hands[attempt.side]
-        await context.until(lambda: hand.status.state in CLOSED, self._config.close_timeout)
-        self._check_grip(context, attempt)
+        await self._grip(context, attempt)
 
     async def _servo(self, context: Context, attempt: Attempt, law: ServoLaw, gap: float) -> None:
-        """Closed loop: let the law bring the hand down, and let it follow the object while the fingers close."""
-        arm, hand = context.arms[attempt.side], context.hands[attempt.side]
-        end = context.t + law.patience
-        closing, camera, self._seen, droop = False, f"{attempt.side}_hand", None, np.zeros(3)
-        down = arm.commanded[:3, 2]
+        """Closed loop: let the law bring the hand down.
+
+        While the fingers close the hand stays where it was sent last. A finger that comes first moves it aside, both
+        hide the object, and what is seen then is a part of it or a neighbour: a hand that follows goes up or off.
+        """
+        arm, self._seen, droop = context.arms[attempt.side], None, np.zeros(3)
+        end, down = context.t + law.patience, arm.commanded[:3, 2]
         below = await ForceGuard.at_rest(context, attempt.side, down, self._config.press_force, lead=LEAD)
         room = FingerRoom(context, attempt.side, gap, self._pressed)
         observer = None
         if isinstance(law, SeeingLaw):
             observer = Observer(context.bus, law.cameras, law.width, topics.rgbd_images)
-        with context.watch(camera, *self._names, doubtful=self._names) as eye:
-            while context.t < end and not (closing and hand.status.state in CLOSED):
+        with context.watch(f"{attempt.side}_hand", *self._names, doubtful=self._names) as eye:
+            while True:
                 fresh = eye.fresh()
                 if isinstance(law, SeeingLaw) and observer is not None:
                     live = context.modules.worker is not None
@@ -320,46 +318,43 @@ class Pick:
                 things = None if fresh is None else self._mine(attempt, fresh.objects)
                 step = law.step(context.t, things, moved(arm.pose, -room.shift))
                 self._seen = followed(self._seen, step)
-                if not closing:
-                    if fresh is not None:
-                        room.look()
-                        text = f"The palm camera guides the hand, sure to {step.sigma * 1e3:.1f} mm."
-                        context.say("servo", text, target=step.target.tolist(), hand=arm.pose[:3, 3].tolist())
-                    if step.status is ServoStatus.CONVERGED:
-                        closing = True
-                        end = context.t + self._config.close_timeout
-                        self._close(context, attempt)
-                        self._heights.append(self._saw(step))
-                    elif step.status is ServoStatus.LOST:
-                        text = f"The palm camera lost the {attempt.label}."
-                        raise PickFailed(PickOutcome.NOTHING_THERE, "servo", "localizer", text)
-                    elif step.status is ServoStatus.TIGHT:
-                        self._saw(step)
-                        text = f"The {attempt.label} stands no higher than a tight one."
-                        raise PickFailed(PickOutcome.TIGHT, "servo", "grasp_method", text)
-                    elif step.status is ServoStatus.STALLED and room.blocked:
-                        text = "Something stands where a finger is to go."
-                        raise PickFailed(PickOutcome.BLOCKED, "servo", "grasp_method", text)
-                    elif step.status is ServoStatus.STALLED:
-                        text = "The hand makes no progress towards the target."
-                        raise PickFailed(PickOutcome.OUT_OF_REACH, "servo", "upper_body", text)
-                if not closing and room.across is not None and self._across is None:
-                    self._across, text = room.across, "Something stands where a finger is to go. Across there is room."
-                    raise PickFailed(PickOutcome.BLOCKED, "servo", "grasp_method", text)
-                if not closing and below():
+                if fresh is not None:
+                    room.look()
+                    text = f"The palm camera guides the hand, sure to {step.sigma * 1e3:.1f} mm."
+                    context.say("servo", text, target=step.target.tolist(), hand=arm.pose[:3, 3].tolist())
+                if step.status is ServoStatus.CONVERGED:
+                    break
+                self._check_servo(attempt, step, room)
+                if below():
                     self._pressed = True
                     text = f"The hand presses on something with {below.largest:.0f} N."
                     raise PickFailed(PickOutcome.BLOCKED, "servo", "localizer", text)
-                if not closing:
-                    T, speed = room.way(step.T_odom_gripper, arm.pose, self._config.servo_speed)
-                    droop = made_up(droop, T, arm.commanded, arm.pose, context.period)
-                    arm.approach(moved(T, droop), speed)
-                elif hand.status.state is GripState.CLOSING:
-                    arm.approach(moved(step.T_odom_gripper, droop + room.shift), self._config.servo_speed)
+                if context.t >= end:
+                    raise StageFailed("servo", "grasp_method", f"No convergence within {law.patience:g} s.")
+                T, speed = room.way(step.T_odom_gripper, arm.pose, self._config.servo_speed)
+                droop = made_up(droop, T, arm.commanded, arm.pose, context.period)
+                arm.approach(moved(T, droop), speed)
                 await context.tick()
-        if not closing:
-            raise StageFailed("servo", "grasp_method", f"No convergence within {law.patience:g} s.")
-        self._check_grip(context, attempt)
+        self._heights.append(self._saw(step))
+        await self._grip(context, attempt)
+
+    def _check_servo(self, attempt: Attempt, step: ServoStep, room: FingerRoom) -> None:
+        """Raise PickFailed where a law gives up, or the fingers find no room but across."""
+        if step.status is ServoStatus.LOST:
+            text = f"The palm camera lost the {attempt.label}."
+            raise PickFailed(PickOutcome.NOTHING_THERE, "servo", "localizer", text)
+        if step.status is ServoStatus.TIGHT:
+            self._saw(step)
+            text = f"The {attempt.label} stands no higher than a tight one."
+            raise PickFailed(PickOutcome.TIGHT, "servo", "grasp_method", text)
+        if step.status is ServoStatus.STALLED and room.blocked:
+            raise PickFailed(PickOutcome.BLOCKED, "servo", "grasp_method", "Something stands where a finger is to go.")
+        if step.status is ServoStatus.STALLED:
+            text = "The hand makes no progress towards the target."
+            raise PickFailed(PickOutcome.OUT_OF_REACH, "servo", "upper_body", text)
+        if room.across is not None and self._across is None:
+            self._across, text = room.across, "Something stands where a finger is to go. Across there is room."
+            raise PickFailed(PickOutcome.BLOCKED, "servo", "grasp_method", text)
 
     def _saw(self, step: ServoStep) -> float:
         """Report where the palm camera sees the object; returns its height in odom [m]."""
@@ -367,14 +362,14 @@ class Pick:
         tried.x, tried.y, tried.z = (float(v) for v in step.target)
         return tried.z
 
-    def _close(self, context: Context, attempt: Attempt) -> None:
+    async def _grip(self, context: Context, attempt: Attempt) -> None:
+        """Close the fingers; they have to hold something then."""
+        hand = context.hands[attempt.side]
         context.say("grasp", f"Closing with {self._config.force:g} N per finger.", side=attempt.side)
-        context.hands[attempt.side].close(self._config.force)
-
-    def _check_grip(self, context: Context, attempt: Attempt) -> None:
-        status = context.hands[attempt.side].status
-        if not status.holding:
-            text = f"The fingers hold nothing (gap {status.gap * 1e3:.0f} mm)."
+        hand.close(self._config.force)
+        await context.until(lambda: hand.status.state in CLOSED, self._config.close_timeout)
+        if not hand.status.holding:
+            text = f"The fingers hold nothing (gap {hand.status.gap * 1e3:.0f} mm)."
             raise PickFailed(PickOutcome.NOTHING_THERE, "grasp", "grasp_method", text)
 
     async def _back_off(self, context: Context, side: Side, gap: float) -> None:

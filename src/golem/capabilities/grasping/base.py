@@ -83,8 +83,7 @@ class ServoStep:
         T_odom_gripper: (4, 4) pose the gripper shall go to.
         target: (3,) filtered position of the object in odom [m].
         sigma: standard deviation of that position along its worst axis [m].
-        status: whether it is still tracking. A law may go on after `CONVERGED`: it then follows the object while
-            the fingers close.
+        status: whether it is still tracking. After `CONVERGED` the fingers close, and the hand stays where it is.
     """
 
     T_odom_gripper: Array
