@@ -57,6 +57,6 @@ done
     uvx --quiet --python "$first" --from "$wheel" golem --version > /dev/null
     installed=$SECONDS SECONDS=0
     uvx --quiet --python "$first" --from "$wheel" golem "${demo[@]}" > demo.log 2>&1 || { cat demo.log >&2; exit 1; }
-    folder=$(find "$UV_CACHE_DIR" -type d -name site-packages -path '*archive*' | head -n 1)
-    row "uvx" "$folder" "$installed" "$SECONDS"
+    folder=$(find "$UV_CACHE_DIR" -path '*/site-packages/golem_humanoid-*.dist-info' -prune | head -n 1)
+    row "uvx" "${folder%/*}" "$installed" "$SECONDS"
 )
