@@ -134,6 +134,17 @@ def test_beside_a_wall_the_hand_keeps_aside_along_the_width_of_its_fingers(world
     assert closer.blocked and not closer.shift.any()
 
 
+def test_a_hand_keeps_no_farther_aside_than_it_has_to_by_what_it_sees_from_nearer(world: Any) -> None:
+    seen, T = room(world, (-1.0, 1.0), x=(0.012, 1.0))
+    seen.way(T, lifted(T, HIGH), 0.15)
+    far = np.linalg.norm(seen.shift)
+    clear, _ = room(world, (1.0, 1.1))
+    seen._heights = clear._heights  # pyright: ignore
+    goal, _ = seen.way(T, lifted(T, 0.05), 0.15)
+    assert far > 0.003 and not seen.blocked and not seen.shift.any()
+    assert seen.below(goal) > 0.0
+
+
 @pytest.mark.parametrize("pressed", [False, True])
 @pytest.mark.parametrize(
     ("box", "x", "top"),

@@ -43,11 +43,14 @@ ABOVE = 0.015
 """How far the tips stay above what is in their way [m]."""
 TURNS = (0.2, -0.2, 0.4, -0.4, 0.6, -0.6)
 """Turns about the vertical that are tried, in order, where the fingers have no room [rad]."""
-ASIDE = (0.004, -0.004, 0.007, -0.007)
-"""How far the hand keeps aside along the width of its fingers, tried first [m]: pads of 24 mm hold a screw by half."""
+ASIDE, FAR_ASIDE = (0.004, -0.004), (0.007, -0.007)
+"""How far the hand keeps aside along the width of its fingers [m], tried first, and where no turn gives room: pads of
+24 mm held one of three screws that they were 8 to 9 mm off [own]."""
 ACROSS = tuple(sign * float(turn) for turn in np.arange(0.7, 1.6, 0.1) for sign in (1.0, -1.0))
 """Turns of a hand that comes anew, for which a servo is too near [rad]: beside a wall the fingers fit along it."""
-WAYS = ((0.0, 0.0), *((0.0, aside) for aside in ASIDE), *((turn, 0.0) for turn in TURNS))
+WAYS = (
+    *((0.0, aside) for aside in (0.0, *ASIDE)), *((turn, 0.0) for turn in TURNS), *((0.0, far) for far in FAR_ASIDE)
+)  # fmt: skip
 """Turn [rad] and way aside [m] of the hand where its fingers have no room, in order."""
 PATIENCE = 0.5
 """Time for which something is in the way before the hand comes anew [s]."""
@@ -107,16 +110,15 @@ class FingerRoom:
             T_now: (4, 4) where it is.
             speed: limit of its speed [m/s].
         """
-        if self._misses(T_goal, self._wanted) > self._rough:
-            wanted = next((way for way in WAYS if self._misses(T_goal, way) < 0.5 * self._rough), None)
-            self.blocked = wanted is None
-            self._wanted = wanted or self._wanted
-        else:
-            self.blocked = False
+        fits = self._misses(T_goal, self._wanted) <= self._rough
+        better = WAYS[: WAYS.index(self._wanted)] if fits else WAYS  # from nearer the camera sees more
+        wanted = next((way for way in better if self._misses(T_goal, way) < 0.5 * self._rough), None)
+        self.blocked = wanted is None and not fits
+        self._wanted = wanted or self._wanted
         self._blocked_for = self._blocked_for + self._context.period if self.blocked else 0.0
         if self._blocked_for > PATIENCE:
             self._blocked_for = 0.0
-            ways = ((turn, aside) for turn in ACROSS for aside in (0.0, *ASIDE))
+            ways = ((turn, aside) for some in ((0.0, *ASIDE), FAR_ASIDE) for turn in ACROSS for aside in some)
             free = next((way for way in ways if self._misses(T_goal, way) < 0.5 * self._rough), None)
             self.across = None if free is None else math.atan2(T_goal[1, 0], T_goal[0, 0]) + free[0]
         step = TURN_RATE * self._context.period

@@ -352,7 +352,7 @@ class Pick:
         if step.status is ServoStatus.STALLED:
             text = "The hand makes no progress towards the target."
             raise PickFailed(PickOutcome.OUT_OF_REACH, "servo", "upper_body", text)
-        if room.across is not None and self._across is None:
+        if room.across is not None:
             self._across, text = room.across, "Something stands where a finger is to go. Across there is room."
             raise PickFailed(PickOutcome.BLOCKED, "servo", "grasp_method", text)
 
