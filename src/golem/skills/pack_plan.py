@@ -147,8 +147,9 @@ def make_plan(
         mine = [f for f in range(len(wanted)) if owner[:, f].max() > 0.0 and int(owner[:, f].argmax()) == k]
         hands: dict[int, Side] = {f: SIDES[int(quality[:, s, f].argmax())] for f in mine}
         across = {f: poses[s].to(PlanarPose(wanted[f].listed.x, wanted[f].listed.y, 0.0)).y for f in mine}
-        good = {f: at_rims[:, SIDES.index(hands[f]), s, f] >= GOOD * quality[SIDES.index(hands[f]), s, f] for f in mine}
-        mine.sort(key=lambda f: (wanted[f].listed.loose is False, int(good[f].argmax()), hands[f], across[f]))
+        near = {f: at_rims[:, SIDES.index(hands[f]), s, f] for f in mine}
+        rim = {f: int((near[f] >= GOOD * near[f].max()).argmax()) for f in mine}  # the first that is good
+        mine.sort(key=lambda f: (wanted[f].listed.loose is False, rim[f], hands[f], across[f]))
         way = abs(math.remainder(ring[s] - at, sides.length))
         if mine:
             stops.append(PackStop(poses[s], tuple((wanted[f].number, hands[f]) for f in mine), way))

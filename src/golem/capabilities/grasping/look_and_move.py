@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from golem.capabilities.grasping.base import Grasp, ServoLaw, ServoStatus, ServoStep
+from golem.capabilities.grasping.base import Grasp, ServoLaw, ServoStep
 from golem.capabilities.grasping.visual_servo import ServoLawConfig, VisualServo, VisualServoConfig
 from golem.options import require
 from golem.types import Array, LocalizedObject
@@ -92,8 +92,7 @@ class StopAndGo:
         moves = seen or T[2, 3] > T_odom_gripper[2, 3] + BACK
         if moves:
             self._looks_from = t + c.move + c.rest
-        if not moves or step.status is ServoStatus.CONVERGED:
-            # The fingers close where the hand is; it follows nothing meanwhile.
+        else:
             T = T_odom_gripper.copy()
         way = c.gain * (T[:3, 3] - T_odom_gripper[:3, 3])
         T[:3, 3] = T_odom_gripper[:3, 3] + way * min(1.0, c.step / max(float(np.linalg.norm(way)), 1e-9))
