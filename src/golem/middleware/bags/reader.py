@@ -40,6 +40,8 @@ OTHERS = {
 """What a file that begins so is."""
 FRAME = struct.Struct("<BQ")
 """What precedes a record's content: opcode and length."""
+END = 2**63
+"""After every log time [ns]."""
 DAMAGE = (McapError, ZstdError, struct.error, ValueError, LookupError, OverflowError, RuntimeError, MemoryError)
 """What the libraries raise on bytes that are no MCAP."""
 
@@ -67,14 +69,20 @@ class Bag:
         """Whether its writer completed it; else it ends with the last chunk that is whole."""
         return all(file.finished for file in self.files)
 
-    def messages(self, topics: Collection[str] | None = None) -> Iterator[BagMessage]:
-        """Iterate over the messages in the order of their log times. `topics`: names of those to read; default: all.
+    def messages(self, topics: Collection[str] | None = None, start: int = 0, end: int = END) -> Iterator[BagMessage]:
+        """Iterate over the messages in the order of their log times.
 
-        A file without an index, e.g. one that was not finished, is read in the order in which it was written. Raises
-        BagError: the bag is damaged here.
+        A file without an index, e.g. one that was not finished, is read in the order in which it was written.
+
+        Args:
+            topics: names of those to read; default: all.
+            start, end: log times of the first, and of the first that is left out [ns].
+
+        Raises:
+            BagError: the bag is damaged here.
         """
         for file in self.files:
-            yield from file.messages(topics)
+            yield from file.messages(topics, start, end)
 
 
 class BagFile:
@@ -98,12 +106,14 @@ class BagFile:
         """Its topics."""
         return list(self._channels.values())
 
-    def messages(self, topics: Collection[str] | None = None) -> Iterator[BagMessage]:
+    def messages(self, topics: Collection[str] | None = None, start: int = 0, end: int = END) -> Iterator[BagMessage]:
         with self._open() as file:
             if not self._indexed:
-                yield from (m for m in self._scan(file) if topics is None or m.topic.name in topics)
+                scanned = (m for m in self._scan(file) if topics is None or m.topic.name in topics)
+                yield from (m for m in scanned if start <= m.log_time < end)
                 return
-            for _, channel, record in SeekingReader(file, validate_crcs=True).iter_messages(topics):
+            reader = SeekingReader(file, validate_crcs=True)
+            for _, channel, record in reader.iter_messages(topics, starting_at=start, ending_before=end):
                 if channel.id in self._channels:
                     yield _message(self._channels[channel.id], record)
 

@@ -1,4 +1,4 @@
-"""The black box of a stop opens at the moment of the fault."""
+"""A black box opens at the moment of the fault, and any bag of a robot from its start."""
 
 from __future__ import annotations
 
@@ -9,14 +9,18 @@ import numpy as np
 import pytest
 from tests.dashboard import test_live
 
-from golem.dashboard.stop_view import StopView, nearest, read_stop
+from golem.dashboard.bag_view import BagView, nearest, read_recording
 from golem.errors import ConfigError
 from golem.hardware.safety.base import SafetyLimits
-from golem.interfaces import public
+from golem.interfaces import images, public
+from golem.interfaces import ros_convert as convert
 from golem.interfaces.payloads import GateState, GateStatus, Reason
-from golem.middleware.bags.base import BagMessage
+from golem.middleware.bags.base import BagMessage, BagTopic
 from golem.middleware.bags.recorder import topic
 from golem.middleware.bags.writer import BagWriter
+from golem.middleware.ros import codec
+from golem.middleware.ros.msgs.geometry_msgs import PoseWithCovariance
+from golem.middleware.ros.msgs.nav_msgs import Odometry
 from golem.middleware.wire.convert import encode_low_command, encode_low_state
 from golem.robots.model.table import JOINT_INDEX
 from golem.runtime.live.black_box import BlackBox
@@ -52,8 +56,8 @@ def folder(tmp_path: Path) -> Path:
 
 
 def test_a_black_box_is_read_with_the_stop_as_its_zero(folder: Path) -> None:
-    stop = read_stop(folder)
-    assert stop.status.reason is Reason.VELOCITY
+    stop = read_recording(folder)
+    assert stop.stop is not None and stop.stop.reason is Reason.VELOCITY
     now = stop.at(0.0)
     assert stop.times[now] == pytest.approx(0.0, abs=1e-6) and stop.states[now].dq[KNEE] == 12.0
     assert stop.states[stop.at(-0.01)].dq[KNEE] == 1.0 and stop.at(-99.0) == 0
@@ -61,22 +65,63 @@ def test_a_black_box_is_read_with_the_stop_as_its_zero(folder: Path) -> None:
 
 
 def test_the_joint_that_is_nearest_to_its_limit_comes_first(folder: Path) -> None:
-    stop = read_stop(folder)
+    stop = read_recording(folder)
     first = nearest(stop.states[stop.at(0.0)], None, SafetyLimits.from_profile()).splitlines()[2]
     assert first.startswith("| left_knee |") and "speed" in first and "12.0" in first
 
 
-def test_what_is_no_black_box_is_said(tmp_path: Path) -> None:
-    row = public.topic("/lowstate")
-    bag = BagWriter(tmp_path / "calm")
-    bag.write(BagMessage(topic(row.name, row.type, row.qos), 1, 1, encode_low_state(state(0.0))))
+def test_a_bag_without_a_robot_is_said(tmp_path: Path) -> None:
+    row = public.topic("/odom")
+    bag = BagWriter(tmp_path / "bag")
+    bag.write(BagMessage(topic(row.name, row.type, row.qos), 1, 1, odom(0.0)))
     bag.close()
-    with pytest.raises(ConfigError, match="no black box of a stop"):
-        read_stop(tmp_path / "calm")
+    with pytest.raises(ConfigError, match="holds no /lowstate"):
+        read_recording(tmp_path / "bag")
+
+
+def odom(x: float) -> bytes:
+    T = np.eye(4)
+    T[0, 3] = x
+    return bytes(codec.serialize(Odometry(pose=PoseWithCovariance(pose=convert.pose(T)))))
+
+
+def test_any_bag_is_played_from_its_start(tmp_path: Path) -> None:
+    """States are thinned, the robot stands where /odom says, and a picture belongs to its moment."""
+    rows, bag = dict[str, BagTopic](), BagWriter(tmp_path / "bag")
+
+    def add(name: str, t: float, payload: bytes) -> None:
+        if name not in rows:
+            row = public.topic(name)
+            rows[name] = topic(row.name, row.type, row.qos)
+        bag.write(BagMessage(rows[name], round(t * 1e9), round(t * 1e9), payload))
+
+    image = public.image("head", public.COLOR)
+    for k in range(200):
+        t = 100.0 + 0.01 * k
+        add("/odom", t, odom(0.01 * k))
+        add("/lowstate", t, encode_low_state(state(t - 100.0)))
+        if k % 50 == 0:
+            rgb = np.full((4, 6, 3), k, np.uint8)
+            add(image, t, bytes(codec.serialize(images.color_image(t, rgb, "camera_color_optical_frame"))))
+    bag.close()
+    recording = read_recording(tmp_path / "bag")
+    assert recording.stop is None and len(recording.times) == 100
+    assert recording.times[0] == 0.0 and recording.times[-1] == pytest.approx(1.98)
+    seen = recording.picture(image, 1.2)
+    assert seen is not None and (seen == 100).all()
+    assert recording.picture(image, 9.0) is None
+    with closing(BagView(recording, 0)) as view:
+        view._time.value = 1.0
+        view.update()
+        assert view._robot.data.qpos[0] == pytest.approx(1.0)
+        assert list(view._pictures) == [image]
+        view._joint.value, view._quantity.value = "left_knee", "speed [rad/s]"
+        view.update()
+        assert (view._plot.data[1] == 1.0).all() and view._plot.data[0][0] == pytest.approx(-1.0)
 
 
 def test_it_opens_at_the_moment_of_the_fault_and_the_slider_moves_the_robot(folder: Path) -> None:
-    with closing(StopView(read_stop(folder), 0)) as view:
+    with closing(BagView(read_recording(folder), 0)) as view:
         assert view._time.value == 0.0
         view.update()
         assert "left_knee" in view._table.content
