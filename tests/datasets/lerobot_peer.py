@@ -21,10 +21,14 @@ if what == "read":
     print(json.dumps({"episodes": data.num_episodes, "frames": len(data), "task": rows[0]["task"], "fps": data.fps}))
 else:
     from lerobot.configs.types import FeatureType
-    from lerobot.datasets.utils import dataset_to_policy_features
     from lerobot.policies.act.configuration_act import ACTConfig
     from lerobot.policies.act.modeling_act import ACTPolicy
     from lerobot.policies.factory import make_pre_post_processors
+
+    try:
+        from lerobot.utils.feature_utils import dataset_to_policy_features  # from 0.6 on
+    except ImportError:
+        from lerobot.datasets.utils import dataset_to_policy_features
 
     features = dataset_to_policy_features(data.meta.features)
     kept = {name: f for name, f in features.items() if name in ("observation.state", "action") or ".images." in name}

@@ -1,6 +1,6 @@
 """Our data sets in the package lerobot, its checkpoints behind our client, and independent checkers of data sets.
 
-`GOLEM_LEROBOT_PYTHON` names an interpreter with lerobot (0.4.4 was tried), msgpack and websockets.
+`GOLEM_LEROBOT_PYTHON` names an interpreter with lerobot (0.4.4 and 0.6.1 were tried), msgpack and websockets.
 """
 
 from __future__ import annotations
