@@ -2,8 +2,8 @@
 
 It runs in the environment of the policy, with `msgpack`, `websockets` and `numpy`, and needs nothing of GOLEM's:
 
-    python serve_policy.py lerobot FOLDER_OR_REPO --port 8000        # needs lerobot; 0.4.4 from Python 3.10 on, 0.6.1 from 3.12
-    python serve_policy.py my_policy.py:make --port 8000             # make() returns what has infer(observation)
+    python serve_policy.py lerobot FOLDER_OR_REPO --port 8000      # needs lerobot: 0.4.4, or 0.6.1 from Python 3.12 on
+    python serve_policy.py my_policy.py:make --port 8000           # make() returns what has infer(observation)
 
 On the robot: golem ladder --method '{use: policy, port: 8000, cameras: [right_hand], width: 160}'
 """
