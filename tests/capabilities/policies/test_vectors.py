@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from golem.capabilities.policies.observer import resized
 from golem.capabilities.policies.openpi import PolicyLinkConfig
 from golem.capabilities.policies.stream import ActionStream
 from golem.capabilities.policies.vectors import (
@@ -141,3 +142,13 @@ def test_live_nobody_waits_and_who_is_late_is_given_up() -> None:
         stream.step(0.6, lambda: {}, live=True)
     go.set()
     stream.close()
+
+
+@pytest.mark.parametrize("size", [(320, 240), (160, 120), (224, 168)])
+def test_a_smaller_depth_is_where_its_colour_is(size: tuple[int, int]) -> None:
+    """Colour is a mean over what becomes one pixel, so depth is from its middle, and none is made up."""
+    columns, rows = np.meshgrid(np.arange(640.0, dtype=np.float32), np.arange(480.0, dtype=np.float32))
+    for picture in (columns, rows):
+        colour, depth = resized(picture, size), resized(picture, size, smooth=False)
+        assert abs(float((depth - colour).mean())) <= 0.5
+        assert set(np.unique(depth)) <= set(np.unique(picture))

@@ -25,7 +25,8 @@ def resized(picture: NDArray[Any], size: tuple[int, int], smooth: bool = True) -
     """Return a picture with `size` (width, height); of depths and labels none is made up."""
     if picture.shape[1::-1] == size:
         return picture
-    return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA if smooth else cv2.INTER_NEAREST))
+    # OpenCV's INTER_NEAREST takes the upper left of the pixels that become one: depth would be beside its colour.
+    return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA if smooth else cv2.INTER_NEAREST_EXACT))
 
 
 class Observer:
