@@ -194,6 +194,14 @@ def test_a_full_tray_is_changed_for_the_next_and_where_none_is_left_the_rest_wai
     assert world.run(DisassembleGoal(job="pack.sqlite")).value.fates == ["in_tray"] * 32
 
 
+def test_a_tray_that_looks_full_once_is_gone_on_with(tmp_path: Path) -> None:
+    write_list(tmp_path / "list.csv", PLACES)
+    world = JobWorld(
+        PLACES, tmp_path, lambda n, tries: PickReport("tray_full") if len(world.asked) in (3, 9) else picked(n, tries)
+    )
+    assert world.run(GOAL).value.fates == ["in_tray"] * 32
+
+
 def test_a_robot_that_gets_nowhere_gives_up_and_the_job_is_kept(tmp_path: Path) -> None:
     write_list(tmp_path / "list.csv", PLACES)
     result = JobWorld(PLACES, tmp_path, fails="approach").run(GOAL)

@@ -80,7 +80,7 @@ class PackJob:
         self._T_odom_pack = PlanarPose(0.0, 0.0, 0.0)
         self._rim = SeenRim()  # above base_link, had the legs no height
         self._off = dict[str, Array]()  # (2,) from what the head camera sees to what a hand's does, in base_link [m]
-        self._full, self._strikes = set[str](), 0
+        self._full, self._doubted, self._strikes = set[str](), set[str](), 0
         self._stops: list[PackStop] = []
 
     async def run(self) -> SkillResult:
@@ -341,8 +341,9 @@ class PackJob:
         tries = 1 if believed else TRIES
         if result.success and found.in_tray != Sight.NO:
             fate, self.report.picked = Fate.IN_TRAY, self.report.picked + 1
+            self._doubted.discard(name)
         elif outcome is PickOutcome.TRAY_FULL:
-            self._full.add(name)
+            (self._full if name in self._doubted else self._doubted).add(name)  # one view of it may err
         elif result.success or (outcome is PickOutcome.SLIPPED and found.bore_empty != Sight.NO):
             reason = f"It was let go and is not seen in the {name}." if result.success else reason
             await self._tell(taken, Fate.UNSETTLED, reason, side)
