@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from golem.dashboard import film
+from golem.dashboard import film, live
 from golem.dashboard.history import BALANCE
 from golem.dashboard.live import LiveView
 from golem.dashboard.panel import Button
@@ -44,7 +44,7 @@ def test_speed_layers_plot_and_the_past(view: LiveView, walker: tuple[LockstepRu
         box.value = True
     controls._signal.value = BALANCE
     walker[1].data.body("left_knee_link").xpos[:] += 1.0
-    view._next_camera = 0.0
+    view._next_camera = view._next_chart = 0.0
     view.update()
     assert stage._layers == frozenset(LAYERS)
     assert stage._frames["pelvis"].visible and len(stage._shapes) > 20
@@ -58,9 +58,33 @@ def test_speed_layers_plot_and_the_past(view: LiveView, walker: tuple[LockstepRu
     np.testing.assert_allclose(stage._bodies["left_knee_link"].position, before, atol=0.05)
     for box in controls._layers.values():
         box.value = False
-    view._next_camera = 0.0
+    view._next_camera = view._next_chart = 0.0
     view.update()
     assert "/world/contacts" not in view._server.scene._handle_from_node_name and not stage._frames["pelvis"].visible
+
+
+def test_what_rests_is_neither_sent_nor_pictured_again(
+    view: LiveView, walker: tuple[LockstepRunner, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = list[str]()
+    monkeypatch.setattr(
+        live, "camera_picture", lambda running, shown, camera: made.append(camera) or np.zeros((4, 4, 3))
+    )
+    rest(view, 0.1)
+    stage, data = view._stage, walker[1].data
+    knee, palm = (np.array(stage._bodies[name].position) for name in ("left_knee_link", "right_hand"))
+    made.clear()
+    view._pictured, view._positions = time.perf_counter(), view._view.poses()[0]
+    data.body("left_knee_link").xpos[:] += 1e-3
+    data.body("right_hand").xpos[:] += 1e-5
+    view._next_camera = 0.0
+    view.update()
+    assert not made and np.array_equal(stage._bodies["right_hand"].position, palm)
+    np.testing.assert_allclose(stage._bodies["left_knee_link"].position, knee + 1e-3, atol=1e-6)
+    data.body("left_knee_link").xpos[:] += 0.01
+    view._next_camera = 0.0
+    view.update()
+    assert made == list(live.CAMERAS)
 
 
 def test_robot_time_goes_as_fast_as_asked(view: LiveView) -> None:

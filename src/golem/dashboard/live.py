@@ -36,7 +36,7 @@ from golem.runtime.executor import FOREVER
 from golem.runtime.lockstep import LockstepRunner
 from golem.skills.base import Routine, SkillResult
 from golem.skills.context import Context
-from golem.types import SIDES, TICK, UPPER, Twist
+from golem.types import SIDES, TICK, UPPER, Array, Twist
 
 if TYPE_CHECKING:
     import viser
@@ -45,6 +45,11 @@ PERIOD = 0.05
 """Time between two updates of the picture [s]."""
 CAMERA_PERIOD = 0.2
 """Time between two pictures of the cameras [s]; each is rendered or compressed on the CPU."""
+CHART_PERIOD = 0.5
+"""Time between two charts and maps, which are drawn on the CPU [s]."""
+STILL = 0.002
+"""While nothing moves by more [m], pictures of the cameras are made once in `RESTING` [s]."""
+RESTING = 1.0
 CAMERA_WIDTH = 320
 """Width of these pictures [px]."""
 CAMERAS = {"right_hand": "right palm camera", "head": "head camera"}
@@ -109,7 +114,8 @@ class LiveView(AbstractContextManager["LiveView", None]):
         self._note = ""
         self._film = LiveFilm()
         self.decide: Callable[[bool], None] = lambda yes: None
-        self._next_camera = 0.0
+        self._next_camera = self._next_chart = self._pictured = 0.0
+        self._positions: Array | None = None
         self._factor = 1.0
         self._watch(running, robot)
         if passive:
@@ -225,7 +231,8 @@ class LiveView(AbstractContextManager["LiveView", None]):
         self._timeline.update(self._running)
         now, t = time.perf_counter(), self._running.executor.t
         signals = read_signals(self._running.bus, float(self._recorder.trace(last=PERIOD).margin[-1]))
-        self._history.add(Snapshot(t, *self._view.poses(), signals))
+        newest = Snapshot(t, *self._view.poses(), signals)
+        self._history.add(newest)
         self._note = self._film.tick(self._running) or self._note
         if now - self._pace[0] > 2.0:
             self._factor = (t - self._pace[1]) / (now - self._pace[0])
@@ -248,15 +255,28 @@ class LiveView(AbstractContextManager["LiveView", None]):
         )
         if now >= self._next_camera:
             self._next_camera = now + CAMERA_PERIOD
-            self._show_pictures()
+            self._show_layers()
+            if self._moved(newest.positions) or now >= self._pictured + RESTING:
+                self._pictured, self._positions = now, newest.positions
+                self._show_pictures()
+        if now >= self._next_chart:
+            self._next_chart = now + CHART_PERIOD
+            self._show_charts()
 
-    def _show_pictures(self) -> None:
+    def _moved(self, positions: Array) -> bool:
+        """Return whether anything is elsewhere than in the newest pictures; `positions` (n, 3) [m]."""
+        old = self._positions
+        return old is None or old.shape != positions.shape or bool(np.abs(positions - old).max() > STILL)
+
+    def _show_layers(self) -> None:
         bus, view = self._running.bus, self.panel.view
         self._stage.show_layers(view.layers, clouds(bus) if "clouds" in view.layers else ())
         state = bus.latest(topics.LOW_STATE)
-        view.plot(self._history)
         if state is not None:
             self.panel.arms.show(state.q[UPPER], {side: self._running.commanded(side) for side in SIDES})
+
+    def _show_charts(self) -> None:
+        self.panel.view.plot(self._history)
         if self.panel.legs is not None:
             chart = balance_chart(self._recorder.trace(), CHART)
             if chart is not None:
@@ -264,9 +284,11 @@ class LiveView(AbstractContextManager["LiveView", None]):
         floor = map_view(self._running.bus)
         if floor is not None:
             self.panel.show_picture("map", floor)
-        pack = bus.latest(topics.PACK_PLAN)
+        pack = self._running.bus.latest(topics.PACK_PLAN)
         if pack is not None:
             self.panel.show_picture("pack", pack.rgb)
+
+    def _show_pictures(self) -> None:
         for camera, label in CAMERAS.items():
             picture = camera_picture(self._running, self._view, camera)
             height = round(CAMERA_WIDTH * picture.shape[0] / picture.shape[1])

@@ -54,6 +54,8 @@ CAMERAS: dict[str, Camera] = {
 FRAMES = (BASE_LINK, "torso_link", "left_hand", "right_hand")
 LAYERS = ("frames", "clouds", "collision shapes", "contacts")
 """What can be shown besides the bodies."""
+SEEN = (1e-4, 2e-4)
+"""What moves by less is not told to browsers: distance [m], and parts of a quaternion."""
 CLOUD_POINTS = 4000
 """Points of a cloud that are sent at most."""
 FORCE_ARROW = 0.001
@@ -97,11 +99,12 @@ class Stage:
         }
         self._shapes: dict[str, viser.SceneNodeHandle] = {}
         self._layers: frozenset[str] = frozenset()
+        self._told: tuple[Array, Array] | None = None
         self.show(0.0, None)
 
     def look(self, view: SpectatorView) -> None:
         """Show what `view` sees from now on: another episode in the same world."""
-        self._view = view
+        self._view, self._told = view, None
         self._followed = np.zeros(2)
 
     def show(
@@ -115,9 +118,14 @@ class Stage:
             poses: of another moment, as of `SpectatorView.poses`.
             follow: whether the camera goes with the robot.
         """
-        names = self._view.moving
-        placed = dict(zip(names, zip(*(poses or self._view.poses()), strict=True), strict=True))
-        for name, (position, wxyz) in placed.items():
+        names, now = self._view.moving, poses or self._view.poses()
+        placed = dict(zip(names, zip(*now, strict=True), strict=True))
+        if self._told is None:
+            self._told = np.full_like(now[0], np.inf), np.full_like(now[1], np.inf)
+        away = [np.abs(new - old).max(axis=1) > least for new, old, least in zip(now, self._told, SEEN, strict=True)]
+        for i in np.flatnonzero(away[0] | away[1]):
+            name, position, wxyz = names[i], now[0][i], now[1][i]
+            self._told[0][i], self._told[1][i] = position, wxyz
             for handle in (self._bodies[name], self._frames.get(name), self._shapes.get(name)):
                 if handle is not None:
                     handle.position, handle.wxyz = position, wxyz
@@ -134,6 +142,7 @@ class Stage:
         if "collision shapes" in layers and not self._shapes:
             for mesh in self._view.meshes(collision=True):
                 self._shapes[mesh.name] = self._scene.add_glb(f"{WORLD}/shape_{mesh.name}", mesh.glb)
+            self._told = None
         for name, handles in (("frames", self._frames), ("collision shapes", self._shapes)):
             if (name in layers) != (name in self._layers):
                 for handle in handles.values():
