@@ -72,7 +72,9 @@ REASONS: dict[Reason, ReasonText] = {
     Reason.IMU_IMPLAUSIBLE: ReasonText(
         309,
         f"Orientation and rate differ by {_L.imu_drift:g} rad, at rest gravity is {_L.gravity_angle:g} rad off, "
-        f"or the mean specific force is outside {_L.gravity_moving[0]:g} to {_L.gravity_moving[1]:g} m/s^2.",
+        f"or the mean specific force is outside {_L.gravity_moving[0]:g} to {_L.gravity_moving[1]:g} m/s^2. At rest "
+        f"the bounds are {_L.gravity[0]:g} to {_L.gravity[1]:g}. Or two flat feet stand {_L.lean:g} rad off its up for "
+        "0.3 s.",
         "The gyro has an offset or the IMU is loose: let it start at rest.",
     ),
     Reason.POSITION: ReasonText(
@@ -177,7 +179,7 @@ def page() -> str:
         "numbers (profile `urdf`).\n",
         "| state | what the motors are told |",
         "| --- | --- |",
-        "| init | nothing: something is missing |",
+        "| init | nothing, or damping if the gate was armed before: something is missing |",
         "| armed | damping; waits for `golem safety activate` |",
         "| active | the stack's commands, limited |",
         "| stop2 | legs stand by a controller of the gate, arms damp; `stop` damps all, `reset`, `activate` go on |",
