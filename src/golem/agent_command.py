@@ -131,19 +131,20 @@ def run_mcp(config: McpConfig) -> bool:
     rules, token = load_rules(config.rules), _token(config)
     if config.stack is None and (config.view or config.record is not None):
         raise ConfigError("--view and --record are for a STACK in this process; beside a domain: golem view, record.")
+    stack = None if config.stack is None else load_stack(config.stack, profile=config.profile)
     listener = listen("127.0.0.1", config.port) if served and config.port is not None else None
     with ExitStack() as ending:
         log = AuditLog(config.audit, bag=str(config.record or ""), stack=config.stack or "", rules=str(config.rules))
         ending.callback(log.close)
         view: LiveView | None = None
         body: Body
-        if config.stack is None:
+        if stack is None:
             joined = ending.enter_context(member("mcp", config.dds))
             body = DomainBody(*joined, f"start a stack with: {config.dds.command('up STACK')}", config.jobs)
         else:
             # Where stdout is the client's, what a library prints goes elsewhere.
             with redirect_stdout(sys.stderr):
-                running, robot = build(load_stack(config.stack, profile=config.profile), config.seed)
+                running, robot = build(stack, config.seed)
                 ending.enter_context(closing(robot))
                 show = ending.enter_context(on_air(running, robot, config.record))
                 if config.view:

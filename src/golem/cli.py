@@ -141,8 +141,8 @@ def _train(words: list[str]) -> int:
 
 def _record(words: list[str]) -> int:
     """Record a domain into a bag that ROS 2 tools and Foxglove read; --lerobot DATASET: into a data set."""
-    if words[:1] == ["--lerobot"]:
-        return _dataset(["live", *words[1:]])
+    if "--lerobot" in words:
+        return _dataset(["live", *(word for word in words if word != "--lerobot")])
     from golem.runtime.live.record_commands import RecordConfig, run_record
 
     return _exit_code(run_record(_parse(RecordConfig, "record", words)))

@@ -57,7 +57,8 @@ class RunConfig:
     operate: bool = False
     """Drive, push and start skills in the live view until Ctrl-C; the default where the robot stands on its feet."""
     world: Annotated[World | None, arg(metavar="NAME", help_behavior_hint="")] = None
-    """World of the twin: pack, open, slope, step, rubble, furnished or corridor; default: the stack file's."""
+    """World of the twin: pack, plant, ioniq5, ioniq5_plant, kitchen, counter, robocasa, open, slope, step, rubble,
+    furnished or corridor; default: the stack file's."""
     profile: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="")] = None
     """Realism profile: ideal, bench or field; default: the stack file's."""
     seed: int = 0

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import cast
 
 import pytest
+from tests.agent.fake_body import FakeBody
 
 from golem.agent.audit import AuditLog, read_audit
+from golem.agent.body import Body
+from golem.agent.desk import Desk
 from golem.agent.tool_rules import Region, Rules, ToolRule, load_rules
 from golem.errors import ConfigError, GolemError
 
@@ -56,6 +60,16 @@ def test_rules_without_sense_are_refused_in_one_sentence(tmp_path: Path, text: s
     with pytest.raises(ConfigError) as caught:
         read(tmp_path, text)
     assert "\n" not in str(caught.value)
+
+
+def test_a_rule_for_a_tool_that_is_none_is_refused(tmp_path: Path) -> None:
+    """What it means to forbid would run freely; a skill that this stack lacks may be in a file for several stacks."""
+    log = AuditLog(tmp_path / "audit.jsonl")
+    body = cast(Body, FakeBody())
+    Desk(body, Rules(tools={"go": ToolRule("never"), "open": ToolRule("never"), "stop": ToolRule()}), log)
+    with pytest.raises(ConfigError, match="'disasemble'.*Did you mean 'disassemble'"):
+        Desk(body, Rules(default="free", tools={"disasemble": ToolRule("never")}), log)
+    log.close()
 
 
 def test_no_rules_at_all_ask_for_everything_that_moves() -> None:

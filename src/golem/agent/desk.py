@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from golem import registry
 from golem.agent.answers import answer, refusal, words
 from golem.agent.audit import AuditLog
 from golem.agent.body import Body, BodyMotion, Picture
@@ -97,7 +98,14 @@ class Desk:
     """
 
     def __init__(self, body: Body, rules: Rules, audit: AuditLog, clock: Callable[[], float] = time.monotonic) -> None:
-        """Let agents use `body` as `rules` say, and keep all of it in `audit`; `clock` is this process's own [s]."""
+        """Let agents use `body` as `rules` say, and keep all of it in `audit`; `clock` is this process's own [s].
+
+        Raises ConfigError: the rules name a tool that is none, so what they mean to narrow would be free.
+        """
+        known = {*OWN, *body.specs, *registry.names("skill")}
+        for name in rules.tools:
+            if name not in known:
+                raise unknown_name("tool in the rules", name, known)
         self.body, self.rules, self._audit, self._clock = body, rules, audit, clock
         self._inbox: SimpleQueue[Callable[[], None]] = SimpleQueue()
         self.asked: dict[int, Call] = {}

@@ -109,19 +109,19 @@ def times(stream: ActionStream, seconds: float) -> list[tuple[float, float, floa
 
 
 def test_the_latency_is_charged() -> None:
-    given = times(ActionStream(Counting(), PolicyLinkConfig(fps=10, use=5, latency=0.2)), 1.5)
+    given = times(ActionStream(Counting(), PolicyLinkConfig(fps=10, n_action_steps=5, latency=0.2)), 1.5)
     assert given[0] == (0.2, 0.0, 2.0)  # asked at 0: the first two are over
     assert (0.5, 0.0, 5.0) in given  # the next observation goes out, and the old ones go on
     assert (0.69, 0.0, 6.0) in given and (0.7, 1.0, 2.0) in given
 
 
 def test_without_latency_the_first_action_is_the_first() -> None:
-    given = times(ActionStream(Counting(), PolicyLinkConfig(fps=10, use=5, latency=0.0)), 0.6)
+    given = times(ActionStream(Counting(), PolicyLinkConfig(fps=10, n_action_steps=5, latency=0.0)), 0.6)
     assert given[0] == (0.0, 0.0, 0.0) and (0.49, 0.0, 4.0) in given and (0.5, 1.0, 0.0) in given
 
 
 def test_a_chunk_that_is_over_holds_its_last_action() -> None:
-    given = times(ActionStream(Counting(3), PolicyLinkConfig(fps=10, use=8, latency=1.0)), 1.2)
+    given = times(ActionStream(Counting(3), PolicyLinkConfig(fps=10, n_action_steps=8, latency=1.0)), 1.2)
     assert given[0] == (1.0, 0.0, 2.0) and given[-1][2] == 2.0
 
 

@@ -28,7 +28,7 @@ class PolicyLinkConfig:
         latency: declared time from an observation to its actions [s]: the robot goes on with the actions before, and
             the first of the new ones are too late.
         fps: actions of a chunk per second [Hz], as the data set was recorded.
-        use: actions of a chunk that are used before the next observation goes out.
+        n_action_steps: actions of a chunk that are used before the next observation goes out.
         cameras: whose pictures it is sent.
         width: of the pictures [px]; 0 is as the camera has it.
         api_key: of the server, if it asks for one.
@@ -40,7 +40,7 @@ class PolicyLinkConfig:
     timeout: float = 5.0
     latency: float = 0.1
     fps: int = 15
-    use: int = 8
+    n_action_steps: int = 8
     cameras: tuple[str, ...] = ("right_hand",)
     width: int = 0
     api_key: str = ""
@@ -53,7 +53,7 @@ class PolicyLinkConfig:
             ("timeout", self.timeout, 0.0 < self.timeout <= 600.0, "from 0 to 600 s"),
             ("latency", self.latency, 0.0 <= self.latency <= 10.0, "from 0 to 10 s"),
             ("fps", self.fps, 1 <= self.fps <= 100, "from 1 to 100 Hz"),
-            ("use", self.use, 1 <= self.use <= 1000, "from 1 to 1000"),
+            ("n_action_steps", self.n_action_steps, 1 <= self.n_action_steps <= 1000, "from 1 to 1000"),
             ("width", self.width, self.width == 0 or 16 <= self.width <= 4096, "0, or from 16 to 4096 px"),
         )
         if any(c in self.host for c in "/?#@ "):

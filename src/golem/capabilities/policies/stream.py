@@ -84,7 +84,7 @@ class ActionStream:
                 self._job = None
                 self._chunk, self._begun = check_actions(job.result()), asked
         index = math.floor((t - self._begun) * c.fps + 1e-6)
-        if self._job is None and (self._chunk is None or index >= min(c.use, len(self._chunk))):
+        if self._job is None and (self._chunk is None or index >= min(c.n_action_steps, len(self._chunk))):
             seen = observe()
             if seen is not None:
                 self._job = self._pool.submit(self._policy.infer, {**seen, "prompt": self._prompt}), t

@@ -50,12 +50,12 @@ def check_estop(bench: Workbench) -> StepFinding:
     if not link.spin(patience, lambda: link.gate is not None and reason() not in silent):
         why = "it says nothing" if link.gate is None else link.gate.why
         return StepFinding(False, f"the gate hears no emergency stop: {why}")
-    bench.person.act(Task(Act.PRESS, "Press the emergency stop."))
+    bench.person.act(Task(Act.PRESS, "Press the emergency stop (a virtual one: golem safety press)."))
     asked = time.monotonic()
     if not link.spin(patience, lambda: reason() is Reason.ESTOP_PRESSED):
         return StepFinding(False, f"the button was to be pressed, and no press arrived within {patience:g} s")
     pressed = time.monotonic() - asked
-    bench.person.act(Task(Act.RELEASE, "Release it again."))
+    bench.person.act(Task(Act.RELEASE, "Release it again (golem safety release)."))
     if not link.spin(patience, lambda: link.gate is not None and reason() is not Reason.ESTOP_PRESSED):
         return StepFinding(False, "the button was to be released, and the gate still hears it pressed")
     return StepFinding(True, "pressed and released", {"from the request to the press [s]": round(pressed, 2)})

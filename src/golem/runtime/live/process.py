@@ -55,7 +55,8 @@ class TwinConfig:
     stack: Positional[str] = "tether"
     """Path of a stack file, or the name of a shipped one."""
     world: str | None = None
-    """World of the twin: pack, open, slope, step, rubble, furnished or corridor; default: the stack file's."""
+    """World of the twin: pack, plant, ioniq5, ioniq5_plant, kitchen, counter, robocasa, open, slope, step, rubble,
+    furnished or corridor; default: the stack file's."""
     profile: str | None = None
     """Realism profile: ideal, bench or field; default: the stack file's."""
     seed: int = 0

@@ -41,7 +41,7 @@ def read_passport(file: str | Path, network: str | Path | None = None) -> Passpo
     other = Path(network).expanduser() if network else None
     own = str(file) in shipped()
     if not own and path.suffix in (".onnx", ".pt") and not path.is_file():
-        raise ConfigError(f"There is no policy {path}.")
+        raise ConfigError(f"There is no policy {path}; {', '.join(shipped())} are shipped ones.")
     try:
         passport = None if own else _foreign(path, other)
         if passport is not None:
