@@ -70,6 +70,19 @@ def test_a_stance_that_failed_and_what_is_near_the_gantry_are_left_out() -> None
     assert taken and all(np.hypot(*(ones[k].place[:2] - gantry)) > 1.0 for k in taken)
 
 
+@pytest.mark.parametrize("rim", [-0.35, -0.15])
+def test_what_has_no_other_stance_is_tried_from_the_same_once_more(rim: float) -> None:
+    ones = pack(0)
+    sides = PackSides(np.array([one.place for one in ones]))
+    few = trays(2)
+    before = make_plan(sides, ones, few, START, [rim])
+    for stop in before:
+        for number, side in stop.picks:
+            ones[number].barred = [(stop.pose, side)]
+    again = {number for stop in make_plan(sides, ones, few, START, [rim]) for number, _ in stop.picks}
+    assert {number for stop in before for number, _ in stop.picks} <= again
+
+
 def test_a_list_of_one_edge_is_worked_on_from_that_edge() -> None:
     ones = [
         PackFastener(k, Listed(f"{k}", "screw", 0.022, y, 0.0))

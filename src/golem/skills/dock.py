@@ -37,6 +37,7 @@ async def approach(context: Context, navigator: GoTo, target: PlanarPose) -> Non
     Raises:
         StageFailed: the odometry has fallen silent; the robot stands.
     """
+    context.release_arms()  # none is drawn to where it was
     navigator.start(target)
     end = context.t + TIMEOUT
     try:

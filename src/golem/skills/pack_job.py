@@ -9,7 +9,7 @@ import numpy as np
 from golem.capabilities.navigation.goto import GoTo
 from golem.interfaces import topics
 from golem.interfaces.memory_payloads import ShownPicture
-from golem.skills.base import FAULT, REFUSED, SkillResult, StageFailed
+from golem.skills.base import FAULT, REFUSED, TIMEOUT, SkillResult, StageFailed
 from golem.skills.context import Context
 from golem.skills.disassemble_goal import DisassembleGoal, DisassembleReport
 from golem.skills.dock import SETTLE, STEPS, DockReport, approach
@@ -105,7 +105,7 @@ class PackJob:
                     heard = self._gantry.t
                     await self._context.until(lambda: self._gantry.t != heard or self._gantry.silent, math.inf)  # noqa: B023
         for one in todo:
-            if not self._near_gantry(one.place[:2]):
+            if not (self._near_gantry(one.place[:2]) or self._full & {tray.name for tray in self._listed(one.label)}):
                 await self._tell(one, Fate.OUT_OF_REACH, "From no stance a hand reaches it and a container for it.")
         return self._summary(self._context.t - start)
 
@@ -197,7 +197,7 @@ class PackJob:
     def _in_odom(self, one: PackFastener | Listed) -> Array:
         """Return (2,) where something of the list is, as the head camera sees it, in odom [m]."""
         at = one.listed if isinstance(one, PackFastener) else one
-        there = self._T_odom_pack @ PlanarPose(at.x, at.y, 0.0)
+        there = PlanarPose.of(self._context.T_odom_base) @ self._T_pack_base.to(PlanarPose(at.x, at.y, 0.0))
         return np.array([there.x, there.y])
 
     def _level(self, one: PackFastener) -> float:
@@ -236,9 +236,9 @@ class PackJob:
                 await self._tell(one, Fate.OPEN, text, side, stance=stop.pose)
                 continue
             outcome = await self._take(one, side)
-            if outcome is PickOutcome.TRAY_MISSING:
+            if outcome is PickOutcome.TRAY_MISSING and not self._listed(one.label):
                 return self._strike(f"No {self._container(one.label)} is seen.", "localizer")
-            if outcome is PickOutcome.TRAY_FULL:
+            if outcome in NO_TRAY:
                 return None
             if outcome is PickOutcome.NOTHING_THERE:  # odom drifts while the arms work, so its place may have moved
                 self._off.pop(side, None)  # or the hand learned it from a neighbour
@@ -294,13 +294,13 @@ class PackJob:
         known, T = np.array(ones).reshape(-1, 3), self._T_pack_base.matrix()
         places = seen.places[:, :2] @ T[:2, :2].T + T[:2, 3]
         boxes = np.array([(c.x, c.y) for c in self._book.containers if c.kind == container]).reshape(-1, 2)
-        shift = np.zeros(2)
+        shifts = [np.zeros(2)]  # a tray that the view cuts off seems to be elsewhere
         if seen.tray is not None and len(boxes):
             away = T[:2, :2] @ seen.tray[:2] + T[:2, 3] - boxes
             nearest = away[int(np.linalg.norm(away, axis=1).argmin())]
-            shift = nearest if np.linalg.norm(nearest) < SHIFTED else shift
-        heights = seen.places[:, 2] + self._context.legs.height
-        a, b = matched(known + (*shift, 0.0), np.column_stack([places, heights]), WANTED)
+            shifts = [nearest, *shifts] if np.linalg.norm(nearest) < SHIFTED else shifts
+        cloud = np.column_stack([places, seen.places[:, 2] + self._context.legs.height])
+        shift, a, b = max(((s, *matched(known + (*s, 0.0), cloud, WANTED)) for s in shifts), key=lambda m: len(m[1]))
         if not len(a):
             return
         self._rim, a, b = self._rim.seen(a[:, :2], b[:, 2] - a[:, 2]), a[:, :2], b[:, :2]
@@ -335,14 +335,15 @@ class PackJob:
         outcome, reason, fate = PickOutcome(found.outcome), result.reason, Fate.OPEN
         taken = self._which(one, found) if found.tried and outcome in AT_IT else one
         if taken is not one:
-            await self._tell(one, Fate.OPEN, f"A hand came to {taken.listed.name} instead.")
+            last = Fate.OPEN if result.success or one.tries < TRIES else Fate.NOT_FOUND
+            await self._tell(one, last, f"A hand came to {taken.listed.name} instead.")
         out = result.success and taken.label == "nut"  # where it was, a stud looks like it
         believed = outcome is PickOutcome.TIGHT and self._goal.loosened == "unknown" and not taken.listed.loose
         tries = 1 if believed else TRIES
         if result.success and found.in_tray != Sight.NO:
             fate, self.report.picked = Fate.IN_TRAY, self.report.picked + 1
             self._doubted.discard(name)
-        elif outcome is PickOutcome.TRAY_FULL:
+        elif outcome is PickOutcome.TRAY_FULL or (outcome in NO_TRAY and listed is not None):
             (self._full if name in self._doubted else self._doubted).add(name)  # one view of it may err
         elif result.success or (outcome is PickOutcome.SLIPPED and found.bore_empty != Sight.NO):
             reason = f"It was let go and is not seen in the {name}." if result.success else reason
@@ -354,7 +355,7 @@ class PackJob:
             fate = Fate.MISSING if fate is Fate.NOT_FOUND and not found.tried else fate
         tray = name if fate is Fate.IN_TRAY else ""
         await self._tell(taken, fate, reason, side, tray, stance, await self._picture(taken))
-        if result.stage in (FAULT, REFUSED):
+        if result.stage in (FAULT, REFUSED, TIMEOUT):
             raise StageFailed(result.stage, result.slot or "skill", result.reason)
         return outcome
 
@@ -392,7 +393,7 @@ class PackJob:
         done, left = (sum(one.fate is Fate.IN_TRAY for one in ones), sum(one.fate in TO_DO for one in ones))
         text = f"{done} of {len(ones)} fasteners are in their trays, {len(ones) - done - left} are set aside"
         if self._full:
-            text += f", {left} wait: full are {', '.join(sorted(self._full))}; empty them and start again."
+            text += f", {left} wait: full or not seen are {', '.join(sorted(self._full))}; empty them and start again."
             return SkillResult(False, "place", "localizer", text, {"total": seconds}, self.report)
         text += f", {left} are not said to be loose, or by the gantry." if left else "."
         self._context.say("done", text)

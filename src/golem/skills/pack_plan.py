@@ -134,7 +134,7 @@ def make_plan(
         for stance, hand in one.barred:
             gone = [stance.to(p) for p in poses]
             same = [math.hypot(g.x, g.y) < BARRED[0] and abs(g.yaw) < BARRED[1] for g in gone]
-            quality[SIDES.index(hand), same, f] = 0.0
+            quality[SIDES.index(hand), same, f] *= 0.1 if len(one.barred) == 1 else 0.0  # again, for want of another
     best = quality.max(axis=0)
     served = best > np.where(best.max(axis=0) > NEED, NEED, 0.0)
     ring = np.array([sides.ring(p) for p in poses])

@@ -161,7 +161,10 @@ async def set_back(context: Context, config: PickConfig, travel: Travel, side: S
     with suppress(StageFailed):
         await travel.carry(side, [lifted(T, config.clearance)], config.travel_speed)
         stop = await ForceGuard.at_rest(context, side, T[:3, 2], config.press_force, lead=LEAD)
-        await travel.line(side, T, config.descend_speed, "place", stop=stop)
+        try:
+            await travel.line(side, T, config.descend_speed, "place", stop=stop)
+        except StageFailed:  # askew is better than to let it fall on the pack
+            await arm.move(T, config.descend_speed, stop=stop)
         hand.open(gap)
         await context.until(lambda: hand.status.state is GripState.OPEN, 2.0)
         await arm.move(lifted(arm.commanded, config.clearance), config.travel_speed)

@@ -63,6 +63,14 @@ def test_a_tray_that_is_filled_up_is_full() -> None:
     assert box is not None and box.full
 
 
+def test_what_hangs_above_a_tray_does_not_fill_it() -> None:
+    points = cloud()
+    hand = np.column_stack([np.random.default_rng(1).uniform(-0.06, 0.06, (3000, 2)) + CENTER, np.full(3000, 0.2)])
+    inside = np.linalg.norm(points[:, :2] - CENTER, axis=1) < 0.07
+    box = fit_open_box(sighting(np.concatenate([points[~inside], hand])))
+    assert box is not None and not box.full
+
+
 @pytest.mark.parametrize("points", [np.zeros((0, 3)), cloud(walls=False)])
 def test_where_no_walls_stand_is_no_box(points: Array) -> None:
     assert fit_open_box(sighting(points)) is None

@@ -26,6 +26,8 @@ EDGE_ROOM = 0.02
 """What is this near to the rim may be wall [m]."""
 LEAST = 4
 """Points that tell the height of a cell."""
+LYING = 0.2
+"""Share of the points inside that are lower than what is told of its contents: something may hang above it."""
 FULL = 0.020
 """A box whose contents come this near to its rim is full [m]."""
 
@@ -120,7 +122,7 @@ def fit_open_box(sighting: LocalizedObject) -> OpenBox | None:
     box = OpenBox(_axes(yaw) @ (0.5 * (low + high)), yaw, size, 0.0, 0.0)
     rim = float(np.quantile(walls[box.contains(walls), 2], 0.9))
     inside = sighting.points[box.contains(sighting.points, 0.1 * float(size.min()))]
-    return replace(box, rim=rim, level=float(np.median(inside[:, 2])) if len(inside) else float(middle[2]))
+    return replace(box, rim=rim, level=float(np.quantile(inside[:, 2], LYING)) if len(inside) else float(middle[2]))
 
 
 def _axes(yaw: float) -> Array:
