@@ -1,0 +1,67 @@
+"""What the live view costs beside a standing robot: `python scripts/live_view_minutes.py 30`.
+
+A client that speaks the browser's protocol looks on for so many minutes, then nobody does for three. Printed are the
+CPU time per robot second of both, and the memory of the process at the beginning and at the end.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import msgspec
+import viser
+from websockets import connect
+
+PORT = 8097
+AT = re.compile(rb"robot time ([0-9.]+) s")
+LOOK = {
+    "type": "ViewerCameraMessage", "wxyz": [1.0, 0.0, 0.0, 0.0], "position": [2.0, 1.0, 1.5], "fov": 0.75, "near": 0.1,
+    "far": 100.0, "image_height": 800, "image_width": 1280, "look_at": [0.0, 0.0, 1.0], "up_direction": [0.0, 0.0, 1.0],
+}  # fmt: skip
+"""What a browser says before it counts as one that looks."""
+
+
+def used(pid: int) -> tuple[float, float]:
+    """Return CPU time [s] and memory [MB] of a process."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
+    pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK"), pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+async def look(pid: int, seconds: float) -> list[tuple[float, float, float]]:
+    """Look on; return robot time [s], CPU time [s] and memory [MB] at the beginning and at the end."""
+    found = list[tuple[float, float, float]]()
+    loop = asyncio.get_running_loop()
+    end = loop.time() + seconds
+    address, protocol = f"ws://127.0.0.1:{PORT}", f"viser-v{viser.__version__}"
+    async with connect(address, subprotocols=[protocol], max_size=None, origin=f"http://127.0.0.1:{PORT}") as socket:  # pyright: ignore[reportArgumentType]
+        await socket.send(msgspec.msgpack.encode(LOOK))
+        while loop.time() < end or not found:
+            message = await socket.recv()
+            said = AT.search(message) if isinstance(message, bytes) else None
+            if said is not None:
+                found[1:] = [(float(said.group(1)), *used(pid))]
+    return found
+
+
+async def main(minutes: float) -> None:
+    """Print the two costs."""
+    robot = subprocess.Popen(["golem", "run", "stand", "--port", str(PORT)], stdout=subprocess.DEVNULL)
+    try:
+        await asyncio.sleep(60.0)  # kernels may have to be compiled
+        await look(robot.pid, 30.0)
+        first, last = (await look(robot.pid, 60.0 * minutes))[:2]
+        await asyncio.sleep(180.0)
+        alone = (await look(robot.pid, 1.0))[0]
+    finally:
+        robot.kill()
+    for what, (t0, cpu0, mb0), (t1, cpu1, mb1) in (("looked at", first, last), ("alone", last, alone)):
+        print(f"{what}: {t1 - t0:.0f} robot s, {(cpu1 - cpu0) / (t1 - t0):.3f} CPU s each, {mb0:.0f} to {mb1:.0f} MB")
+
+
+asyncio.run(main(float(sys.argv[1])))
