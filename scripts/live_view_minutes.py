@@ -37,14 +37,14 @@ async def look(pid: int, seconds: float) -> list[tuple[float, float, float]]:
     """Look on; return robot time [s], CPU time [s] and memory [MB] at the beginning and at the end."""
     found = list[tuple[float, float, float]]()
     loop = asyncio.get_running_loop()
-    end = loop.time() + seconds
+    begin = loop.time() + 2.0  # what is sent at first is of when somebody looked last
     address, protocol = f"ws://127.0.0.1:{PORT}", f"viser-v{viser.__version__}"
     async with connect(address, subprotocols=[protocol], max_size=None, origin=f"http://127.0.0.1:{PORT}") as socket:  # pyright: ignore[reportArgumentType]
         await socket.send(msgspec.msgpack.encode(LOOK))
-        while loop.time() < end or not found:
+        while loop.time() < begin + seconds or not found:
             message = await socket.recv()
             said = AT.search(message) if isinstance(message, bytes) else None
-            if said is not None:
+            if said is not None and loop.time() > begin:
                 found[1:] = [(float(said.group(1)), *used(pid))]
     return found
 
