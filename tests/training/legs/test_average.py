@@ -19,7 +19,7 @@ from golem.training.legs.export_policy import average
 ROOT = Path(__file__).parents[3]
 SHIPPED = ROOT / "src/golem/capabilities/legs/policies"
 PARTS = [ROOT / "artefacts/legs" / f"stand_{name}.onnx" for name in ("seventh", "gate", "back")]
-ROUGH = [SHIPPED / "almi_walk.onnx", ROOT / "artefacts/legs/walk_rough_seed0.onnx"]
+ROUGH = [ROOT / "artefacts/legs" / f"walk_rough_{name}.onnx" for name in ("first", "ground", "steps")]
 
 
 def weights(path: Path) -> dict[str, np.ndarray]:
@@ -27,7 +27,7 @@ def weights(path: Path) -> dict[str, np.ndarray]:
 
 
 @pytest.mark.parametrize(
-    ("name", "parts", "shares"), [("almi_stand", PARTS, (2.0, 1.0, 1.0)), ("almi_walk_rough", ROUGH, (1.0, 1.0))]
+    ("name", "parts", "shares"), [("almi_stand", PARTS, (2.0, 1.0, 1.0)), ("almi_walk_rough", ROUGH, (1.0, 1.0, 1.0))]
 )
 def test_a_shipped_network_is_the_mean_that_the_docs_say(
     name: str, parts: list[Path], shares: tuple[float, ...], tmp_path: Path

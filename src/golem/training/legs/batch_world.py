@@ -98,7 +98,7 @@ class LegGate:
 
 
 Rows = NDArray[np.intp]
-WHOLE = 0.3
+WHOLE = 0.5
 """Share of the footholds on rough ground that are as high as a ledge is at most, or level: a step, up or down."""
 SLIPPERY = 0.25
 """Share of the episodes in the most slippery tenth of the range: an even draw hardly ever is."""

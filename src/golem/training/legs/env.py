@@ -140,7 +140,7 @@ TASKS: dict[Task, EnvConfig] = {
     "rough": EnvConfig(
         impulse=60.0,
         world=WorldConfig(friction=(0.15, 1.1), payload=5.0, slope=0.15, roughness=0.03, ledge=0.05),
-        clearance=0.1,
+        clearance=0.14,
     ),
     "stand": EnvConfig(
         standing=1.0,
