@@ -527,34 +527,6 @@ def test_it_looks_afterwards_whether_the_screw_is_there(full: Any, thing: Any, c
     assert (result.value.in_tray, result.value.bore_empty) == ("yes", "yes")
 
 
-@pytest.mark.parametrize(
-    ("lay_before", "tray_seen", "falls", "says"),
-    [
-        (False, True, (0.01, 0.0), "yes"),
-        (True, True, (0.03, 0.0), "yes"),  # it came to lie beside another one
-        (True, True, None, "unknown"),  # what lies there lay there before
-        (False, True, (0.12, 0.0), "unknown"),  # what the hand let go is below it
-        (False, False, (0.01, 0.0), "unknown"),  # then this may be beside the tray
-    ],
-)
-def test_the_palm_camera_sees_what_was_let_go_lie_in_the_tray(
-    full: Any, thing: Any, lay_before: bool, tray_seen: bool, falls: tuple[float, float] | None, says: str
-) -> None:
-    """The head camera sees neither here."""
-
-    def below() -> list[LocalizedObject]:
-        if "place" not in full.stages:
-            return [thing("screw", SCREW, full.t)]
-        lying = [TRAY] if lay_before else []
-        if falls is not None and not full.holds:
-            lying.append(TRAY + (*falls, 0.0))
-        tray = [thing("tray", TRAY, full.t)] if tray_seen else []
-        return [*tray, *(thing("screw", place, full.t) for place in lying)]
-
-    full.objects["right_hand"] = below
-    assert picked(full).value.in_tray == says
-
-
 def test_a_bore_that_still_looks_taken_is_reported(full: Any) -> None:
     result = picked(full)
     assert result.success and "still looks taken" in result.reason

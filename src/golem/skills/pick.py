@@ -91,7 +91,7 @@ class Pick:
             choice, attempt = await self._look_and_take(context, goal, timings, tried)
             last = self._report.tried[-1]
             seen = np.array([last.x, last.y, last.z]) if self._seen is None else self._seen
-            fell = await place(context, self._config, self._travel, attempt, seen, choice, self._off, self._names)
+            await place(context, self._config, self._travel, attempt, seen, choice, self._off)
             self._report.outcome = last.outcome = PickOutcome.PICKED.value
         except StageFailed as failure:
             context.say(failure.stage, str(failure), failed=True)
@@ -105,7 +105,7 @@ class Pick:
         for side in _hands(goal, tried):
             await self._travel.home(side, self._config.travel_speed)
         if result.success:
-            await look_after(context, self._config, attempt, choice, self._names, self._report, fell)
+            await look_after(context, self._config, attempt, choice, self._names, self._report)
             result = replace(result, reason=f"{result.reason[:-1]}{self._report.seen}.")
             context.say("done", result.reason)
         return replace(result, value=self._report)

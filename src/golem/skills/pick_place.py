@@ -35,10 +35,6 @@ INSIDE = 0.03
 FARTHEST = 0.12
 """What the palm camera sees farther than this from where the head camera did is not that container [m] [own: see "The
 palm camera looks at the tray" in docs/decisions/arms.md]."""
-BELOW = (0.08, 0.04)
-"""How far from the fingertips what they let go may lie, to the side at most and down at least [m]."""
-MOVED = 0.015
-"""What the palm camera sees within this of where it saw something lies there still [m]."""
 LEANS = (0.0, 0.35)
 """How far a hand leans outwards that lets go [rad]: leaning, the fingers get some centimetres further."""
 SHARES = (1.0, 0.75, 0.5, 0.25)
@@ -90,15 +86,13 @@ async def pull(
 
 
 async def place(
-    context: Context, config: PickConfig, travel: Travel, attempt: Attempt, seen: Array, choice: PickChoice,
-    off: Array, names: Sequence[str],
-) -> bool:  # fmt: skip
-    """Carry what a hand holds over the container and let go; return whether the palm camera saw it lie there then.
+    context: Context, config: PickConfig, travel: Travel, attempt: Attempt, seen: Array, choice: PickChoice, off: Array
+) -> None:
+    """Carry what a hand holds over the container and let go.
 
     Args:
         seen: (3,) where the palm camera saw what the head camera had chosen, in odom [m].
         off: (3,) by how much it was known to see things elsewhere [m].
-        names: what it may be called.
 
     Raises:
         StageFailed: no place above the container is reached, or the object was lost.
@@ -121,26 +115,11 @@ async def place(
         if refusal_of(failure) is Refusal.UNREACHABLE:
             raise PickFailed(PickOutcome.TRAY_OUT_OF_REACH, failure.stage, failure.slot, str(failure)) from failure
         raise
-    known = await _nearer(context, config, travel, attempt, container.sighting.position[:2] + shift[:2])
-    before = await _lying(context, config, attempt, names)
+    await _nearer(context, config, travel, attempt, container.sighting.position[:2] + shift[:2])
     if not hand.status.holding:
         raise PickFailed(PickOutcome.SLIPPED, "place", "grasp_method", f"The {attempt.label} was lost on the way.")
     hand.open(config.release_gap)
     await context.until(lambda: hand.status.state is GripState.OPEN, 2.0)
-    after = await _lying(context, config, attempt, names) if known else []
-    lay = np.concatenate([*before, np.full((1, 3), np.inf)])
-    new = [(np.linalg.norm(points[:, None] - lay, axis=2).min(axis=1) > MOVED).any() for points in after]
-    return 2 * sum(new) > len(new)
-
-
-async def _lying(context: Context, config: PickConfig, attempt: Attempt, names: Sequence[str]) -> list[Array]:
-    """Return the places (n, 3) of `names` below the fingers, in odom [m], in each of some palm pictures."""
-    tips, seen = context.arms[attempt.side].pose[:3, 3], list[Array]()
-    with context.watch(f"{attempt.side}_hand", *names) as eye:
-        while len(seen) < LOOKS and (sightings := await eye.look(config.look_timeout)) is not None:
-            away = positions(sightings, names) - tips
-            seen.append(tips + away[(np.hypot(away[:, 0], away[:, 1]) < BELOW[0]) & (away[:, 2] < -BELOW[1])])
-    return seen
 
 
 def _leaning(out: Array, lean: float) -> Array:
@@ -170,10 +149,8 @@ async def set_back(context: Context, config: PickConfig, travel: Travel, side: S
         await arm.move(lifted(arm.commanded, config.clearance), config.travel_speed)
 
 
-async def _nearer(context: Context, config: PickConfig, travel: Travel, attempt: Attempt, middle: Array) -> bool:
+async def _nearer(context: Context, config: PickConfig, travel: Travel, attempt: Attempt, middle: Array) -> None:
     """Look down at the container with the palm camera, and go further inside if the hand is near its rim or beside it.
-
-    Return whether it is there, by both cameras.
 
     Each camera is off by centimetres, so the mean of both counts. Where the palm camera is too near to know the
     container, it looks from higher up.
@@ -188,8 +165,8 @@ async def _nearer(context: Context, config: PickConfig, travel: Travel, attempt:
             await travel.carry(attempt.side, [lifted(hand, HIGHER)], config.travel_speed)
             raised = True
             seen = await _middle(context, config, attempt)
-    goals, known = list[Array](), seen is not None and bool(np.linalg.norm(seen - middle) < FARTHEST)
-    if seen is not None and known:
+    goals = list[Array]()
+    if seen is not None and np.linalg.norm(seen - middle) < FARTHEST:
         away = 0.5 * (seen + middle) - hand[:2, 3]
         if np.linalg.norm(away) > INSIDE:
             inside = [moved(hand, np.append(share * away, 0.0)) for share in SHARES]
@@ -199,7 +176,6 @@ async def _nearer(context: Context, config: PickConfig, travel: Travel, attempt:
     if goals:
         with suppress(StageFailed):  # then it is no nearer than it is
             await travel.carry(attempt.side, goals, config.travel_speed)
-    return known
 
 
 async def _middle(context: Context, config: PickConfig, attempt: Attempt) -> Array | None:
@@ -214,17 +190,13 @@ async def _middle(context: Context, config: PickConfig, attempt: Attempt) -> Arr
 
 
 async def look_after(
-    context: Context, config: PickConfig, attempt: Attempt, choice: PickChoice, names: Sequence[str],
-    report: PickReport, fell: bool,
-) -> None:  # fmt: skip
+    context: Context, config: PickConfig, attempt: Attempt, choice: PickChoice, names: Sequence[str], report: PickReport
+) -> None:
     """Look with the head camera at container and bore for `names`, and write into the report what it saw.
 
-    The object is in the container if it `fell` there before the palm camera, if something rises there now, or if more
-    such objects are seen there than before. Its place is empty if one of those that were seen around it before is seen
-    no more.
+    The object is in the container if something rises there now, or more such objects are seen there than before. Its
+    place is empty if one of those that were seen around it before is seen no more.
     """
-    if fell:
-        report.in_tray = Sight.YES.value
     frames: list[Array] = []
     clouds: list[Array] = []
     with context.watch("head", *names, attempt.container, doubtful=(attempt.container,)) as eye:
@@ -241,7 +213,7 @@ async def look_after(
     if clouds:
         more = [int(choice.container.holds(points).sum()) > int(inside.sum()) for points in frames]
         gained = choice.container.gained(np.concatenate(clouds))
-        if not fell and (gained is not None or any(more)):
+        if gained is not None or any(more):
             report.in_tray = (Sight.YES if gained or 2 * sum(more) > len(more) else Sight.NO).value
     taken = report.tried[-1]
     stood = choice.seen[~inside]
