@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from golem.interfaces.payloads import Odometry
 from golem.skills.base import TIMEOUT, SkillResult
 from golem.skills.context import Context
 from golem.skills.disassemble_goal import DisassembleGoal
+from golem.skills.pack_view import SeenFasteners
 from golem.skills.pick_config import PickReport, Tried
 from golem.types import PlanarPose
 
@@ -133,3 +135,26 @@ def test_a_pick_that_never_ends_ends_the_job(tmp_path: Path) -> None:
     result = Late(PLACES, tmp_path).run(GOAL)
     assert not result.success and result.stage == TIMEOUT
     assert Counter(result.value.fates)["in_tray"] == 3
+
+
+def test_a_tray_that_the_view_cuts_off_does_not_move_the_pack(tmp_path: Path) -> None:
+    """Its middle is 6 cm off. What stands there says better where the pack is."""
+    trays = {"a": (0.145, -0.3), "b": (0.145, 0.35)}
+
+    class CutOff(JobWorld):
+        async def see_fasteners(self, *args: Any, **options: Any) -> SeenFasteners:
+            seen = await super().see_fasteners(*args, **options)
+            T = self.pose.matrix()
+            place = NEAR_EDGE @ at(np.add(trays["a"], (0.0, 0.06)))
+            tray = np.append(((place.x, place.y) - T[:2, 3]) @ T[:2, :2], 0.0)
+            return replace(seen, tray=tray)
+
+        def pick(self, goal: Any) -> SkillResult:
+            in_pack = NEAR_EDGE.to(at(goal.wanted))
+            missed.append(np.hypot(self.places[:, 0] - in_pack.x, self.places[:, 1] - in_pack.y).min())
+            return super().pick(goal)
+
+    missed = list[float]()
+    with_trays(tmp_path, PLACES, trays, "tray_full")
+    fates = CutOff(PLACES, tmp_path).run(GOAL).value.fates
+    assert Counter(fates)["in_tray"] > 20 and max(missed) < 1e-3
