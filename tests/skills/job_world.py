@@ -65,6 +65,7 @@ class JobWorld:
         walked: way that the robot was sent along [m].
         palm_off: where palm cameras see fasteners, from where they are, in base_link [m].
         told: by how much each pick was told that they are off, in base_link [m].
+        missed: how far from a fastener each pick was sent [m].
     """
 
     def __init__(self, places: Array, folder: Path, says: Says = picked, fails: str = "") -> None:
@@ -73,7 +74,7 @@ class JobWorld:
         lines = self.log.read_text().split("\n") if self.log.exists() else []
         self.out = {int(line[4:]) for line in lines if line.startswith("out ")}
         self.asked, self.palm_off, self.told = list[int](), (0.0, 0.0), list[tuple[float, ...]]()
-        self.goals = list[Any]()
+        self.goals, self.missed = list[Any](), list[float]()
         self.walked, self.bus, self.t = 0.0, Bus(), 0.0
         self.pose = Pose(-0.7, 0.0, 0.0)
         made = {"pick": self._skill(Pick, self.pick), "navigate": self._skill(Navigate, self.navigate)}
@@ -118,7 +119,9 @@ class JobWorld:
 
     def pick(self, goal: Any) -> SkillResult:
         in_pack = NEAR_EDGE.to(at(goal.wanted))
-        number = int(np.hypot(self.places[:, 0] - in_pack.x, self.places[:, 1] - in_pack.y).argmin())
+        away = np.hypot(self.places[:, 0] - in_pack.x, self.places[:, 1] - in_pack.y)
+        number = int(away.argmin())
+        self.missed.append(float(away.min()))
         self.asked.append(number)
         self.told.append(tuple(self.pose.matrix()[:2, :2].T @ goal.off) if goal.off else ())
         self.write(f"ask {number}")

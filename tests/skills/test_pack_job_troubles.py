@@ -29,8 +29,6 @@ DRIFT = PlanarPose(0.05, 0.04, 0.01)
 class TwoOdoms(JobWorld):
     """Detections and hands are in the estimator's odom; the odometry has one of its own, as `lio` has."""
 
-    missed: list[float]
-
     def tell(self) -> None:
         """Publish where the odometry has the robot."""
         self.bus.publish(topics.ODOMETRY, Odometry(self.t, (DRIFT @ self.pose).matrix()), self.t)
@@ -46,13 +44,8 @@ class TwoOdoms(JobWorld):
         self._move(DRIFT.to(target))
         self.tell()
 
-    def pick(self, goal: Any) -> SkillResult:
-        in_pack = NEAR_EDGE.to(at(goal.wanted))
-        self.missed.append(np.hypot(self.places[:, 0] - in_pack.x, self.places[:, 1] - in_pack.y).min())
-        return super().pick(goal)
-
     def run(self, goal: DisassembleGoal, steps: int = 100_000) -> SkillResult:
-        self.missed, refresh = [], self.context.refresh
+        refresh = self.context.refresh
 
         def told(t: float) -> None:
             self.tell()
@@ -149,12 +142,7 @@ def test_a_tray_that_the_view_cuts_off_does_not_move_the_pack(tmp_path: Path) ->
             tray = np.append(((place.x, place.y) - T[:2, 3]) @ T[:2, :2], 0.0)
             return replace(seen, tray=tray)
 
-        def pick(self, goal: Any) -> SkillResult:
-            in_pack = NEAR_EDGE.to(at(goal.wanted))
-            missed.append(np.hypot(self.places[:, 0] - in_pack.x, self.places[:, 1] - in_pack.y).min())
-            return super().pick(goal)
-
-    missed = list[float]()
     with_trays(tmp_path, PLACES, trays, "tray_full")
-    fates = CutOff(PLACES, tmp_path).run(GOAL).value.fates
-    assert Counter(fates)["in_tray"] > 20 and max(missed) < 1e-3
+    world = CutOff(PLACES, tmp_path)
+    fates = world.run(GOAL).value.fates
+    assert Counter(fates)["in_tray"] > 20 and max(world.missed) < 1e-3

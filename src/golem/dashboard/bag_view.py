@@ -17,6 +17,7 @@ from tyro.conf import Positional
 
 from golem.dashboard.history import QUANTITIES
 from golem.dashboard.server import Stage, serve
+from golem.dashboard.view_panel import add_plot
 from golem.errors import ConfigError
 from golem.hardware.safety.base import SafetyLimits
 from golem.hardware.safety.monitor import at_rest
@@ -174,8 +175,6 @@ class BagView:
 
     def __init__(self, recording: Recording, port: int) -> None:
         """Start serving on this machine, at the moment of the stop. Raises ConfigError: the address cannot be had."""
-        from viser import uplot
-
         self.recording, self._limits = recording, SafetyLimits.from_profile()
         robot = build_robot(load_stack("stand").with_options("robot", world="open"), 0)
         assert isinstance(robot, MujocoRobot)
@@ -195,8 +194,7 @@ class BagView:
         joints = [name.removesuffix("_joint") for name in JOINT_NAMES]
         self._joint = gui.add_dropdown("plot", joints, initial_value=joints[0])
         self._quantity = gui.add_dropdown("of it", list(QUANTITIES))
-        series = (uplot.Series(label="from now [s]"), uplot.Series(label="", stroke="#cf7420", width=1.5))
-        self._plot = gui.add_uplot((np.zeros(1),) * 2, series, scales={"x": uplot.Scale(time=False)}, aspect=2.0)
+        self._plot = add_plot(gui, "from now [s]", visible=True)
         self._pictures = dict[str, Any]()
         self._shown: tuple[float, str, str] | None = None
         self._place(0)

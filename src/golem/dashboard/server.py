@@ -119,7 +119,6 @@ class Stage:
             follow: whether the camera goes with the robot.
         """
         names, now = self._view.moving, poses or self._view.poses()
-        placed = dict(zip(names, zip(*now, strict=True), strict=True))
         if self._told is None:
             self._told = np.full_like(now[0], np.inf), np.full_like(now[1], np.inf)
         away = [np.abs(new - old).max(axis=1) > least for new, old, least in zip(now, self._told, SEEN, strict=True)]
@@ -129,9 +128,9 @@ class Stage:
             for handle in (self._bodies[name], self._frames.get(name), self._shapes.get(name)):
                 if handle is not None:
                     handle.position, handle.wxyz = position, wxyz
-        base = placed[BASE_LINK][0][:2] if BASE_LINK in placed else self._view.position(BASE_LINK)[:2]
+        base = now[0][names.index(BASE_LINK)] if BASE_LINK in names else self._view.position(BASE_LINK)
         if follow:
-            self._followed += (1.0 - math.exp(-dt / LAG)) * (base - self._followed)
+            self._followed += (1.0 - math.exp(-dt / LAG)) * (base[:2] - self._followed)
         self._world.position = (-self._followed[0], -self._followed[1], 0.0)
         self._target.visible = self._target_label.visible = target is not None
         if target is not None:

@@ -19,12 +19,21 @@ SPEEDS = {"a tenth": 0.1, "a quarter": 0.25, "half": 0.5, "real time": 1.0, "as 
 NOTHING = "nothing"
 
 
+def add_plot(gui: viser.GuiApi, label: str, *, visible: bool) -> viser.GuiUplotHandle:
+    """Add a plot of one line over time, empty at first; `label` of its times."""
+    from viser import uplot
+
+    series = (uplot.Series(label=label), uplot.Series(label="", stroke="#cf7420", width=1.5))
+    scales = {"x": uplot.Scale(time=False)}
+    return gui.add_uplot((np.zeros(1),) * 2, series, scales=scales, aspect=2.0, visible=visible)
+
+
 class ViewPanel:
     """Controls of one server; they move no robot. `record` is listened to: it begins and ends a film."""
 
     def __init__(self, server: viser.ViserServer, *, standing: bool) -> None:
         """Add the controls, for a robot that is `standing` or hangs."""
-        from viser import Icon, uplot
+        from viser import Icon
 
         gui, self._server = server.gui, server
         with gui.add_folder("View", expand_by_default=False):
@@ -38,11 +47,7 @@ class ViewPanel:
             self.record = gui.add_button("Record a film", color="gray", icon=Icon.VIDEO)
         with gui.add_folder("Plot", expand_by_default=False):
             self._signal = gui.add_dropdown("signal", [NOTHING, BALANCE, *(s for s in SIGNALS if s != BALANCE)])
-            empty = np.zeros(1)
-            series = (uplot.Series(label="before now [s]"), uplot.Series(label="", stroke="#cf7420", width=1.5))
-            self._plot = gui.add_uplot(
-                (empty, empty), series, scales={"x": uplot.Scale(time=False)}, aspect=2.0, visible=False
-            )
+            self._plot = add_plot(gui, "before now [s]", visible=False)
         self._camera.on_update(lambda _: self._point())
         self._picture.on_click(lambda event: threading.Thread(target=self._save, args=(event.client,)).start())
 

@@ -70,7 +70,11 @@ class BodyMesh:
 
 
 class SpectatorView:
-    """The simulated world of one robot, read only."""
+    """The simulated world of one robot, read only.
+
+    Attributes:
+        moving: the visible bodies that can move, in the order of `poses`.
+    """
 
     def __init__(
         self,
@@ -99,12 +103,8 @@ class SpectatorView:
 
         self._meshes = body_meshes.body_meshes
         self._moving = np.array([body for body in body_meshes.visual_geoms(self._model) if body], dtype=int)
+        self.moving: list[str] = [self._model.body(int(body)).name for body in self._moving]
         self._origin = robot.truth.T_world_odom[:3, 3]
-
-    @property
-    def moving(self) -> list[str]:
-        """The visible bodies that can move, in the order of `poses`."""
-        return [self._model.body(int(body)).name for body in self._moving]
 
     def meshes(self, *, collision: bool = False) -> list[BodyMesh]:
         """Return one mesh per visible body, or per moving body that collides."""
