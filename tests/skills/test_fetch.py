@@ -15,7 +15,8 @@ from golem.errors import ConfigError
 from golem.evaluation.conformance.memory_suite import look
 from golem.interfaces import topics
 from golem.interfaces.memory_payloads import MemoryStatus
-from golem.interfaces.payloads import GripState, HandStatus, LegStatus
+from golem.interfaces.nav_payloads import MapPlace, OccupancyGrid
+from golem.interfaces.payloads import GripState, HandStatus, LegStatus, Odometry
 from golem.middleware.bus import Bus
 from golem.robots.model.pinocchio_model import Kinematics
 from golem.skills.base import SkillResult
@@ -26,7 +27,7 @@ from golem.skills.remember import Remember
 from golem.skills.runner import SkillRun
 from golem.skills.take import Take
 from golem.skills.take_config import TakeReport
-from golem.types import SIDES, PlanarPose, Twist
+from golem.types import SIDES, BaseEstimate, PlanarPose, Twist
 
 LEGS = LegStatus(
     0.0, Twist(), Twist(), False, "", False, False, PlanarPose(0.0, 0.0, 0.0), np.zeros(2), "hold", speed=0.0
@@ -35,6 +36,9 @@ NOT_THERE = SkillResult(False, "detect", "localizer", "The head camera shows no 
 TAKEN = SkillResult(
     True, "done", None, "", value=TakeReport("left", "top", below=0.08, above=0.02, off_x=0.01, off_y=-0.07)
 )
+HERE = PlanarPose(0.0, 0.0, 0.0)
+ALWAYS = 2.0
+"""Stamp of a pose of the odometry that is never old in these tests [s]."""
 DONE = SkillResult(True, "done", None, "")
 
 
@@ -56,7 +60,8 @@ class Scripted:
 
 def fetch(
     goal: FetchGoal, takes: Sequence[SkillResult], places: Sequence[SkillResult] = (DONE,), seen: bool = True,
-    state: GripState = GripState.HOLDING, closes: GripState = GripState.EMPTY,
+    state: GripState = GripState.HOLDING, closes: GripState = GripState.EMPTY, T_odom_estimate: PlanarPose = HERE,
+    T_odom_map: PlanarPose | None = None,
 ) -> tuple[SkillResult, dict[str, Scripted]]:  # fmt: skip
     """Return how an errand of a robot that does not walk ended, and what was asked of which skill."""
     skills = {"take": Scripted(Take, takes), "place": Scripted(SetDown, places), "remember": Scripted(Remember, [DONE])}
@@ -67,6 +72,12 @@ def fetch(
     context.bus.publish(topics.MEMORY_STATUS, MemoryStatus(0.0, "odom", 100.0, 1), 0.0)
     context.bus.publish(topics.LEG_STATUS, LEGS, 0.0)
     context.bus.publish(topics.hand_status("left"), HandStatus(0.0, state, 0.07, 0.0, np.zeros(2)), 0.0)
+    context.bus.publish(topics.BASE, BaseEstimate(0.0, np.eye(4)), 0.0)
+    context.bus.publish(topics.ODOMETRY, Odometry(ALWAYS, T_odom_estimate.matrix()), 0.0)
+    if T_odom_map is not None:
+        grid = OccupancyGrid(0.0, T_odom_map, 0.1, np.zeros((50, 50), np.int8), T_odom_map)
+        context.bus.publish(topics.MAP, grid, 0.0)
+        context.bus.publish(topics.MAP_POSE, MapPlace(0.0, T_odom_map, T_odom_map.to(T_odom_estimate)), 0.0)
     run = SkillRun("fetch", Fetch().run(context, goal))
     for _ in range(200):
         context.refresh(context.t + 0.01)
@@ -87,6 +98,25 @@ def test_it_takes_it_where_it_is_remembered_and_sets_it_down_as_it_was_taken() -
     assert placed.label == "mug"  # whose picture is to be a new one
     assert placed.off == (0.01, -0.07)  # of a head camera that is off by that much
     assert result.value.looked == pytest.approx([0.4, 0.0], abs=0.002)
+
+
+def test_hands_get_places_in_the_odom_that_they_go_by() -> None:
+    drifted, T_odom_map = PlanarPose(0.2, -0.1, 0.3), PlanarPose(-0.3, 0.4, 0.5)
+    result, skills = fetch(FetchGoal("mug", (0.5, 0.1)), [TAKEN], T_odom_estimate=drifted, T_odom_map=T_odom_map)
+    (taken,), (placed,) = skills["take"].goals, skills["place"].goals
+    there, to = (T_odom_map @ PlanarPose(x, y, 0.0) for x, y in ((0.4, 0.0), (0.5, 0.1)))
+    assert result.success and result.value.looked == pytest.approx([there.x, there.y], abs=0.002)
+    there, to = drifted.to(there), drifted.to(to)
+    assert taken.near == pytest.approx((there.x, there.y), abs=0.002)
+    assert (placed.x, placed.y) == pytest.approx((to.x, to.y))
+
+
+def test_without_a_map_what_is_remembered_is_in_the_odom_of_the_hands() -> None:
+    goal = FetchGoal("mug", (0.5, 0.1), "base_link")
+    result, skills = fetch(goal, [TAKEN], T_odom_estimate=PlanarPose(0.2, -0.1, 0.3))
+    (taken,), (placed,) = skills["take"].goals, skills["place"].goals
+    assert result.success and taken.near == pytest.approx((0.4, 0.0), abs=0.002)
+    assert (placed.x, placed.y) == pytest.approx((0.5, 0.1))
 
 
 @pytest.mark.parametrize("y", [-0.3, 0.0, 0.3])

@@ -208,6 +208,19 @@ class Context:
         return place.T_odom_map
 
     @property
+    def T_odom_estimate(self) -> PlanarPose:
+        """Where odom of the base estimate, which hands and cameras go by, is in odom of the odometry, which legs go by.
+
+        They drift apart. Far from the robot it is as uncertain as both headings. Raises StageFailed: one is silent.
+        """
+        return PlanarPose.of(self.legs.pose) @ PlanarPose.of(self.T_odom_base).to(PlanarPose(0.0, 0.0, 0.0))
+
+    @property
+    def T_odom_memory(self) -> PlanarPose:
+        """Where the frame of what is remembered is in odom of the odometry: the map's, or that of the base estimate."""
+        return self.T_odom_map if self.mapped else self.T_odom_estimate
+
+    @property
     def joints(self) -> Array:
         """(15,) measured joints of torso, left arm, right arm [rad].
 

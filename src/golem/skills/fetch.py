@@ -156,7 +156,7 @@ class FetchReport:
     """What was done.
 
     Attributes:
-        looked: x, y of the places that were looked at, in odom [m], one after the other.
+        looked: x, y of the places that were looked at, in odom of the odometry [m], one after the other.
         searched: whether it was searched for.
         approaches: how often the robot stepped to a stance.
         taken: how it was taken.
@@ -208,18 +208,15 @@ class Fetch:
         return SkillResult(True, "done", None, reason, {"total": context.t - start}, report)
 
     def _destination(self, context: Context, goal: FetchGoal, home: PlanarPose) -> PlanarPose | None:
-        """Return where to set it down, in the frame of what is remembered or, without a map, in odom."""
+        """Return where to set it down, in the frame of what is remembered."""
         if not goal.to:
             return None
         place = PlanarPose(goal.to[0], goal.to[1], 0.0)
-        if goal.frame != "base_link":
-            return place
-        place = home @ place
-        return context.T_odom_map.to(place) if context.mapped else place
+        return context.T_odom_memory.to(home @ place) if goal.frame == "base_link" else place
 
     def _by_the_nearer_hand(self, context: Context, goal: FetchGoal, to: PlanarPose) -> FetchGoal:
         """Return the goal for the hand on whose side it is set down, by a robot that stays where it is."""
-        T, spot = context.T_odom_base, np.append(self._in_odom(context, to), 0.0)
+        T, spot = context.T_odom_base, np.append(_for_hands(context, self._in_odom(context, to)), 0.0)
         aside = float((spot - T[:3, 3]) @ T[:3, 1])
         near = goal.side == "either" and abs(aside) > ACROSS
         return replace(goal, side="left" if aside > 0.0 else "right") if near else goal
@@ -256,9 +253,8 @@ class Fetch:
         return found[: goal.places]
 
     def _in_odom(self, context: Context, place: RecalledPlace | PlanarPose) -> Array:
-        """Return (2,) a place of the memory's frame in odom [m]."""
-        pose = PlanarPose(place.x, place.y, 0.0)
-        pose = context.T_odom_map @ pose if context.mapped else pose
+        """Return (2,) a place of the memory's frame in odom of the odometry [m]."""
+        pose = context.T_odom_memory @ PlanarPose(place.x, place.y, 0.0)
         return np.array([pose.x, pose.y])
 
     async def _try(
@@ -275,11 +271,11 @@ class Fetch:
             if result.success or _elsewhere(result) or not walks:
                 break
             context.say(result.stage, f"{result.reason} Trying again from a nearer stance.")
-            spot = np.array([found.x, found.y])
+            spot = _for_legs(context, found)
         return result
 
     async def _take(self, context: Context, goal: FetchGoal, spot: Array | None) -> SkillResult:
-        near = () if spot is None else (float(spot[0]), float(spot[1]))
+        near = () if spot is None else tuple(_for_hands(context, spot).tolist())
         return await context.run("take", TakeGoal(goal.text, goal.side, near=near))
 
     async def _take_in_view(self, context: Context, goal: FetchGoal, report: FetchReport) -> SkillResult:
@@ -288,7 +284,7 @@ class Fetch:
         if result.success or _elsewhere(result) or not isinstance(result.value, TakeReport):
             return result
         context.say(result.stage, f"{result.reason} Trying again from a nearer stance.")
-        return await self._try(context, goal, report, np.array([result.value.x, result.value.y]), True)
+        return await self._try(context, goal, report, _for_legs(context, result.value), True)
 
     async def _search(
         self, context: Context, goal: FetchGoal, report: FetchReport, places: list[RecalledPlace]
@@ -362,7 +358,7 @@ class Fetch:
             await context.until(lambda: context.hands[side].status.holding, 2.0 * PATIENCE)
         if to is None:
             return f"The {goal.text} is in the {side} hand, where the robot began."
-        spot = self._in_odom(context, to)
+        spot = _for_hands(context, self._in_odom(context, to))
         aside, off = (taken.aside_x, taken.aside_y), (taken.off_x, taken.off_y)
         if goal.frame == "seen":
             spot += (1.0 - HANDS) * head_off(context.T_odom_base, spot, off)
@@ -381,6 +377,18 @@ class Fetch:
         for tolerance, height in product(BENT, RAISES):
             with suppress(PlanRefused):
                 return await motion.line(side, lifted(T, height), RAISING, tolerance=tolerance)
+
+
+def _for_hands(context: Context, spot: Array) -> Array:
+    """Return (2,) where a `spot` (2,) in odom of the odometry is in that of the base estimate [m]."""
+    there = context.T_odom_estimate.to(PlanarPose(float(spot[0]), float(spot[1]), 0.0))
+    return np.array([there.x, there.y])
+
+
+def _for_legs(context: Context, found: TakeReport) -> Array:
+    """Return (2,) where a thing was seen by what hands go by, in odom of the odometry [m]."""
+    there = context.T_odom_estimate @ PlanarPose(found.x, found.y, 0.0)
+    return np.array([there.x, there.y])
 
 
 def _elsewhere(result: SkillResult) -> bool:

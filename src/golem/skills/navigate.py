@@ -22,7 +22,8 @@ class NavigateGoal:
 
     Attributes:
         x, y, yaw: pose of base_link on the floor [m], [rad].
-        frame: what the pose is given in: `map`; `odom`; or `base_link`, where the robot stands when the skill begins.
+        frame: what the pose is given in: `map`; `odom`, that of the odometry; or `base_link`, where the robot stands
+            when the skill begins.
         timeout: time after which the robot gives up and stands [s].
         content: distance from the goal within which the robot stands at once [m]: for a place on the way to another;
             0 has the navigator correct every stop.

@@ -197,7 +197,7 @@ class PackJob:
     def _in_odom(self, one: PackFastener | Listed) -> Array:
         """Return (2,) where something of the list is, as the head camera sees it, in odom [m]."""
         at = one.listed if isinstance(one, PackFastener) else one
-        there = PlanarPose.of(self._context.T_odom_base) @ self._T_pack_base.to(PlanarPose(at.x, at.y, 0.0))
+        there = self._context.T_odom_estimate.to(self._T_odom_pack @ PlanarPose(at.x, at.y, 0.0))
         return np.array([there.x, there.y])
 
     def _level(self, one: PackFastener) -> float:

@@ -99,8 +99,7 @@ class Search:
         # Things of a kind stand together: where anything stood, this may.
         others = memory.places(ANYTHING) if isinstance(memory, HasPlaces) else []
         places += [(float(p.position[0]), float(p.position[1])) for p in others]
-        spots = [PlanarPose(x, y, 0.0) for x, y in places]
-        spots = [context.T_odom_map @ spot for spot in spots] if mapped else spots
+        spots = [context.T_odom_memory @ PlanarPose(x, y, 0.0) for x, y in places]
         targets = [before(here, np.array((spot.x, spot.y)), STAGE) for spot in spots]
         grid = context.bus.latest(topics.MAP)
         if grid is not None and mapped:
