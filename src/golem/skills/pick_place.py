@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from golem.capabilities.perception.box_search import find_box
+from golem.capabilities.perception.open_box import OpenBox
 from golem.capabilities.planning.base import Refusal
 from golem.interfaces.payloads import GripState
 from golem.skills.base import StageFailed
@@ -17,24 +20,20 @@ from golem.skills.context import Context
 from golem.skills.force_guard import ForceGuard
 from golem.skills.hand_offset import shift_of
 from golem.skills.pick_config import PickConfig, PickFailed, PickOutcome, PickReport, Sight, refusal_of, slipped
-from golem.skills.pick_targets import Attempt, HandReach, PickChoice, positions
+from golem.skills.pick_targets import Attempt, Container, HandReach, PickChoice, positions
 from golem.skills.poses import lifted, moved, turned
 from golem.skills.travel import Travel
+from golem.skills.ware_sight import palm_view
 from golem.types import Array, Side
 
 LEAD = 0.03
 """Way at first, far above anything, on which a hand that comes down learns the friction of its own arm [m]."""
 DROPS = 6
 """Places in the container that are tried."""
-LOOKS = 3
-"""Pictures of the palm camera in which it looks for the container."""
 HIGHER = 0.10
 """How much higher a hand looks that does not see the container from where it lets go [m]."""
 INSIDE = 0.03
 """A hand this near to the container's middle lets go there [m]."""
-FARTHEST = 0.12
-"""What the palm camera sees farther than this from where the head camera did is not that container [m] [own: see "The
-palm camera looks at the tray" in docs/decisions/arms.md]."""
 LEANS = (0.0, 0.35)
 """How far a hand leans outwards that lets go [rad]: leaning, the fingers get some centimetres further."""
 SHARES = (1.0, 0.75, 0.5, 0.25)
@@ -115,7 +114,7 @@ async def place(
         if refusal_of(failure) is Refusal.UNREACHABLE:
             raise PickFailed(PickOutcome.TRAY_OUT_OF_REACH, failure.stage, failure.slot, str(failure)) from failure
         raise
-    await _nearer(context, config, travel, attempt, container.sighting.position[:2] + shift[:2])
+    await _nearer(context, config, travel, attempt, container, shift)
     if not hand.status.holding:
         raise PickFailed(PickOutcome.SLIPPED, "place", "grasp_method", f"The {attempt.label} was lost on the way.")
     hand.open(config.release_gap)
@@ -149,28 +148,31 @@ async def set_back(context: Context, config: PickConfig, travel: Travel, side: S
         await arm.move(lifted(arm.commanded, config.clearance), config.travel_speed)
 
 
-async def _nearer(context: Context, config: PickConfig, travel: Travel, attempt: Attempt, middle: Array) -> None:
+async def _nearer(
+    context: Context, config: PickConfig, travel: Travel, attempt: Attempt, container: Container, shift: Array
+) -> None:
     """Look down at the container with the palm camera, and go further inside if the hand is near its rim or beside it.
 
-    Each camera is off by centimetres, so the mean of both counts. Where the palm camera is too near to know the
-    container, it looks from higher up.
+    Where too little of the container is in view, it looks from higher up.
 
     Args:
-        middle: (2,) of the container, as the head camera saw it, in odom [m].
+        shift: (3,) from where the head camera sees things to where the palm camera does, in odom [m].
     """
-    hand = context.arms[attempt.side].commanded
-    seen, raised = await _middle(context, config, attempt), False
-    if seen is None:
+    if container.box is None:
+        return
+    box = replace(container.box, center=container.box.center + shift[:2], rim=container.box.rim + shift[2])
+    arm, raised = context.arms[attempt.side], False
+    hand = arm.commanded
+    away = await _to_middle(context, config, attempt, box)
+    if away is None:
         with suppress(StageFailed):
             await travel.carry(attempt.side, [lifted(hand, HIGHER)], config.travel_speed)
             raised = True
-            seen = await _middle(context, config, attempt)
+            away = await _to_middle(context, config, attempt, box)
     goals = list[Array]()
-    if seen is not None and np.linalg.norm(seen - middle) < FARTHEST:
-        away = 0.5 * (seen + middle) - hand[:2, 3]
-        if np.linalg.norm(away) > INSIDE:
-            inside = [moved(hand, np.append(share * away, 0.0)) for share in SHARES]
-            goals = [turned(T, turn) for T in inside for turn in config.turns]
+    if away is not None and np.linalg.norm(away) > INSIDE:
+        inside = [moved(hand, share * away) for share in SHARES]
+        goals = [turned(T, turn) for T in inside for turn in config.turns]
     if raised:
         goals.append(hand)
     if goals:
@@ -178,15 +180,11 @@ async def _nearer(context: Context, config: PickConfig, travel: Travel, attempt:
             await travel.carry(attempt.side, goals, config.travel_speed)
 
 
-async def _middle(context: Context, config: PickConfig, attempt: Attempt) -> Array | None:
-    """Return (2,) where the palm camera sees the container's middle, in odom [m]; None: nowhere."""
-    with context.watch(f"{attempt.side}_hand", attempt.container, doubtful=(attempt.container,)) as eye:
-        for _ in range(LOOKS):
-            sightings = await eye.look(config.look_timeout)
-            seen = [o for o in sightings.objects if o.label == attempt.container] if sightings else []
-            if seen:
-                return max(seen, key=lambda o: o.detection.score).position[:2]
-    return None
+async def _to_middle(context: Context, config: PickConfig, attempt: Attempt, box: OpenBox) -> Array | None:
+    """Return (3,) the level way from the hand to the middle of `box` where the palm camera shows it, in odom [m]."""
+    points = await palm_view(context, attempt.side, attempt.container, config.look_timeout, 1)
+    found = find_box(box, points)
+    return None if found is None else np.append(found.center - context.arms[attempt.side].pose[:2, 3], 0.0)
 
 
 async def look_after(

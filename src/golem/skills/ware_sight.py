@@ -76,12 +76,12 @@ async def find(
     return None
 
 
-async def palm_view(context: Context, side: Side, label: str, seconds: float) -> Array:
+async def palm_view(context: Context, side: Side, label: str, seconds: float, frames: int = FRAMES) -> Array:
     """Return the (n, 3) points in odom that the palm camera shows beyond the fingertips [m]; n may be 0."""
     camera = f"{side}_hand"
     with context.watch(camera, label) as eye:
         end = context.t + seconds
-        for _ in range(FRAMES):
+        for _ in range(frames):
             if await eye.look(end - context.t) is None:
                 return np.zeros((0, 3))
     T = context.arms[side].pose

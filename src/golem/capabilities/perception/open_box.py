@@ -51,13 +51,18 @@ class OpenBox:
     level: float
 
     @property
+    def axes(self) -> Array:
+        """(2, 2) its sides as columns."""
+        return _axes(self.yaw)
+
+    @property
     def full(self) -> bool:
         """Whether it takes nothing more."""
         return self.rim - self.level < FULL
 
     def contains(self, points: Array, margin: float = 0.0) -> NDArray[np.bool_]:
         """Return (n,) which of `points` (n, 2) or (n, 3) are, from above, inside the rim and `margin` [m] off it."""
-        turned = np.abs((points[:, :2] - self.center) @ _axes(self.yaw))
+        turned = np.abs((points[:, :2] - self.center) @ self.axes)
         return np.all(turned <= 0.5 * self.size - margin, axis=1)
 
     def heights(self, points: Array, beyond: int = 0) -> Array:
@@ -68,7 +73,7 @@ class OpenBox:
             beyond: cells by which the grid is larger, on each side.
         """
         halves = np.maximum(0.5 * self.size - EDGE_ROOM, GRID) + beyond * GRID
-        turned = (points[:, :2] - self.center) @ _axes(self.yaw)
+        turned = (points[:, :2] - self.center) @ self.axes
         shape = np.ceil(2.0 * halves / GRID).astype(int)
         index = np.floor((turned + halves) / GRID).astype(int)
         inside = np.all((index >= 0) & (index < shape), axis=1)
@@ -88,7 +93,7 @@ class OpenBox:
         steps = [np.arange(-np.floor(h / spacing), np.floor(h / spacing) + 1) * spacing for h in halves]
         grid = np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1).reshape(-1, 2)
         grid = grid[np.argsort(np.linalg.norm(grid, axis=1), kind="stable")]
-        flat = self.center + grid @ _axes(self.yaw).T
+        flat = self.center + grid @ self.axes.T
         return np.column_stack([flat, np.full(len(flat), self.level)])
 
 
@@ -126,6 +131,5 @@ def fit_open_box(sighting: LocalizedObject) -> OpenBox | None:
 
 
 def _axes(yaw: float) -> Array:
-    """Return (2, 2) the two sides as columns."""
     c, s = np.cos(yaw), np.sin(yaw)
     return np.array([[c, -s], [s, c]])
