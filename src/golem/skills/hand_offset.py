@@ -26,6 +26,8 @@ SURE = 0.02
 """Up to here a difference along a row is no mistaken neighbour [m]; screws stand 9 cm apart."""
 ARRIVED, INTEGRAL, DROOP = 0.004, 2.5, 0.012
 """A hand sent this near to its goal arrives, and what holds it off is integrated [m]; how fast [1/s], how far [m]."""
+PAST, SLOWER = 0.003, 0.5
+"""A hand this far beyond its goal has come past it [m]; what the integral's speed is multiplied by then [own]."""
 
 
 async def learn_offset(context: Context, side: Side, names: Sequence[str], known: Array) -> Array | None:
@@ -82,17 +84,31 @@ def shift_of(seen: Array, expected: Array, others: Array) -> Array:
     return shift - along * direction if abs(along) > SURE else shift
 
 
-def made_up(droop: Array, T_goal: Array, T_sent: Array, T_now: Array, dt: float) -> Array:
-    """Return (3,) by how much beside its goal a hand is sent, that measured it comes there, across its approach [m].
+class Droop:
+    """How far beside its goal a hand is sent, so that it comes there as measured, across its approach.
 
     Errors of torques and friction hold an arm by millimetres off where it is sent, and the servo closes within 3 mm.
-
-    Args:
-        droop: (3,) the same until now [m].
-        T_goal, T_sent, T_now: (4, 4) the goal, where the hand was sent, and the measured hand.
-        dt: time since then [s].
+    The integral of what is left makes up for that. A late arm with friction swings around its goal by it, and goes up
+    and down meanwhile: whenever the hand has come past its goal, the integral is slowed down.
     """
-    across = np.eye(3) - np.outer(T_goal[:3, 2], T_goal[:3, 2])
-    arrives = np.linalg.norm(across @ (T_goal[:3, 3] + droop - T_sent[:3, 3])) < ARRIVED
-    droop = droop + (INTEGRAL * dt if arrives else 0.0) * (across @ (T_goal[:3, 3] - T_now[:3, 3]))
-    return droop * min(1.0, DROOP / max(float(np.linalg.norm(droop)), 1e-9))
+
+    def __init__(self) -> None:
+        """Begin with a hand that is sent to its goal."""
+        self._sent, self._gain, self._left = np.zeros(3), INTEGRAL, np.zeros(3)
+
+    def __call__(self, T_goal: Array, T_sent: Array, T_now: Array, dt: float) -> Array:
+        """Return (3,) by how much beside its goal the hand is to be sent, in odom [m].
+
+        Args:
+            T_goal, T_sent, T_now: (4, 4) the goal, where the hand was sent, and the measured hand.
+            dt: time since the last call [s].
+        """
+        across = np.eye(3) - np.outer(T_goal[:3, 2], T_goal[:3, 2])
+        if np.linalg.norm(across @ (T_goal[:3, 3] + self._sent - T_sent[:3, 3])) < ARRIVED:
+            left = across @ (T_goal[:3, 3] - T_now[:3, 3])
+            if np.linalg.norm(left) > PAST:
+                self._gain *= SLOWER if left @ self._left < 0.0 else 1.0
+                self._left = left
+            self._sent = self._sent + self._gain * dt * left
+        self._sent *= min(1.0, DROOP / max(float(np.linalg.norm(self._sent)), 1e-9))
+        return self._sent

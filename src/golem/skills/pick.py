@@ -19,7 +19,7 @@ from golem.skills.body_interface import CLOSE
 from golem.skills.context import Context
 from golem.skills.finger_room import FingerRoom
 from golem.skills.force_guard import CLOSED, ForceGuard
-from golem.skills.hand_offset import learn_offset, made_up
+from golem.skills.hand_offset import Droop, learn_offset
 from golem.skills.pack_view import see_fasteners
 from golem.skills.pick_config import PickConfig, PickFailed, PickGoal, PickOutcome, PickReport, outcome_of, refusal_of
 from golem.skills.pick_place import LEAD, look_after, place, pull, set_back
@@ -302,7 +302,7 @@ class Pick:
         While the fingers close the hand stays where it was sent last. A finger that comes first moves it aside, both
         hide the object, and what is seen then is a part of it or a neighbour: a hand that follows goes up or off.
         """
-        arm, self._seen, droop = context.arms[attempt.side], None, np.zeros(3)
+        arm, self._seen, droop = context.arms[attempt.side], None, Droop()
         end, down = context.t + law.patience, arm.commanded[:3, 2]
         below = await ForceGuard.at_rest(context, attempt.side, down, self._config.press_force, lead=LEAD)
         room = FingerRoom(context, attempt.side, gap, self._pressed)
@@ -332,8 +332,7 @@ class Pick:
                 if context.t >= end:
                     raise StageFailed("servo", "grasp_method", f"No convergence within {law.patience:g} s.")
                 T, speed = room.way(step.T_odom_gripper, arm.pose, self._config.servo_speed)
-                droop = made_up(droop, T, arm.commanded, arm.pose, context.period)
-                arm.approach(moved(T, droop), speed)
+                arm.approach(moved(T, droop(T, arm.commanded, arm.pose, context.period)), speed)
                 await context.tick()
         self._heights.append(self._saw(step))
         await self._grip(context, attempt)
