@@ -84,6 +84,19 @@ def test_a_hand_stays_above_what_is_under_either_finger(world: Any, box: tuple[f
     np.testing.assert_array_equal(goal[:3, :3], T[:3, :3])
 
 
+def test_what_kept_a_hand_off_is_known_when_it_has_gone_up_to_look_again(world: Any) -> None:
+    seen, T = room(world, (0.03, 0.06))
+    assert not seen.kept_off
+    seen.way(lifted(T, 0.004), lifted(T, 0.10), 0.15)
+    for _ in range(round(2.5 / world.context.period)):
+        world.step()
+        seen.way(lifted(T, 0.15), lifted(T, 0.12), 0.15)
+    assert not seen.blocked and seen.kept_off
+    for _ in range(round(1.0 / world.context.period)):
+        world.step()
+    assert not seen.kept_off
+
+
 def test_a_hand_turns_where_that_gives_its_fingers_room(world: Any) -> None:
     seen, T = room(world, (0.03, 0.06), x=(0.006, 0.03))
     first, _ = seen.way(lifted(T, 0.004), lifted(T, 0.10), 0.15)

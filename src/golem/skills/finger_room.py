@@ -52,6 +52,8 @@ WAYS = (
     *((0.0, aside) for aside in (0.0, *ASIDE)), *((turn, 0.0) for turn in TURNS), *((0.0, far) for far in FAR_ASIDE)
 )  # fmt: skip
 """Turn [rad] and way aside [m] of the hand where its fingers have no room, in order."""
+AGO = 3.0
+"""Time that a servo takes to look again from above before it says that it gave up [s]."""
 PATIENCE = 0.5
 """Time for which something is in the way before the hand comes anew [s]."""
 TURN_RATE = 0.6
@@ -80,10 +82,16 @@ class FingerRoom:
         self._heights = np.full((2 * HALF, 2 * HALF), np.nan)
         self._tips, self._around = _fingertips(gap, MARGIN, margin), _fingertips(gap, CLOSE, CLOSE)
         self._turn = self._blocked_for = 0.0
+        self._blocked_at = -np.inf
         self._wanted = WAYS[0]
         self.blocked = False
         self.across: float | None = None
         self.shift: Array = np.zeros(3)
+
+    @property
+    def kept_off(self) -> bool:
+        """Whether something was in the way of the fingers before the servo went up to look again."""
+        return self._context.t - self._blocked_at < AGO
 
     def look(self) -> None:
         """Take over what the newest image of the palm camera shows; newer is nearer, and replaces what was there."""
@@ -114,6 +122,7 @@ class FingerRoom:
         better = WAYS[: WAYS.index(self._wanted)] if fits else WAYS  # from nearer the camera sees more
         wanted = next((way for way in better if self._misses(T_goal, way) < 0.5 * self._rough), None)
         self.blocked = wanted is None and not fits
+        self._blocked_at = self._context.t if self.blocked else self._blocked_at
         self._wanted = wanted or self._wanted
         self._blocked_for = self._blocked_for + self._context.period if self.blocked else 0.0
         if self._blocked_for > PATIENCE:

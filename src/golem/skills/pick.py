@@ -346,7 +346,7 @@ class Pick:
             self._saw(step)
             text = f"The {attempt.label} stands no higher than a tight one."
             raise PickFailed(PickOutcome.TIGHT, "servo", "grasp_method", text)
-        if step.status is ServoStatus.STALLED and room.blocked:
+        if step.status is ServoStatus.STALLED and room.kept_off:
             raise PickFailed(PickOutcome.BLOCKED, "servo", "grasp_method", "Something stands where a finger is to go.")
         if step.status is ServoStatus.STALLED:
             text = "The hand makes no progress towards the target."
