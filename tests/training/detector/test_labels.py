@@ -8,8 +8,8 @@ import pytest
 from golem.training.detector import dataset
 from golem.training.detector.dataset import looking
 from golem.training.detector.labels import CLASSES, COLUMNS, KITCHEN, label_image, within
-from golem.training.detector.random_pack import build_pack
-from golem.training.detector.random_scene import AWAY, make_rigs, refresh
+from golem.training.detector.random_pack import RandomPack
+from golem.training.detector.random_scene import AWAY
 
 
 @pytest.mark.parametrize(
@@ -22,7 +22,7 @@ def test_labelled_centres_lie_on_the_geoms_of_their_part(kind: str, classes: set
     for part in scene.parts:
         for name in part.geoms:
             owner[scene.model.geom(name).id] = CLASSES.index(part.label)
-    plain, fancy = make_rigs(scene.world)
+    plain, fancy = scene.make_rigs()
     total, right, seen = 0, 0, set()
     with plain, fancy:
         for k in range(10 if kind == "pack" else 20):
@@ -57,12 +57,12 @@ def test_small_parts_that_the_border_cuts_are_ignored_and_large_ones_are_not_tol
 
 def test_a_pulled_screw_leaves_a_hole_label() -> None:
     rng = np.random.default_rng(2)
-    scene = build_pack(rng)
+    scene = RandomPack(rng)
     data, model = scene.data, scene.model
-    plain, fancy = make_rigs(scene.world)
+    plain, fancy = scene.make_rigs()
     with plain, fancy:
         scene.randomise_objects(rng)
-        for body in scene.world.distractors:
+        for body in scene.distractors:
             model.body_pos[body] = AWAY
         info = scene.place_head(rng)
         counts = []
@@ -72,7 +72,7 @@ def test_a_pulled_screw_leaves_a_hole_label() -> None:
                 data.qpos[at : at + 3] = bore.mouth + draw.protrusion * draw.axis()
                 data.qpos[at + 3 : at + 7] = draw.quat()
                 data.qpos[at + 2] -= 3.0 * out
-            refresh(scene.world)
+            scene.refresh()
             labels = label_image(scene, info, plain.segment(data, info.name))
             counts.append([int((labels[:, 0] == CLASSES.index(name)).sum()) for name in ("screw", "screw_hole")])
     (screws, holes), (screws_out, holes_out) = counts

@@ -21,13 +21,12 @@ from golem.robots.sensors.cameras import CAMERAS
 from golem.robots.sensors.streams import stream
 from golem.robots.worlds.conditions import Conditions, draw_conditions
 from golem.robots.worlds.fridge import HINGE
-from golem.robots.worlds.kitchen import FRONTS, STEELS, TOPS, KitchenLayout, add_kitchen, draw_counter, draw_kitchen
-from golem.robots.worlds.pack import PackPart
+from golem.robots.worlds.kitchen import FRONTS, STEELS, TOPS, add_kitchen, draw_counter, draw_kitchen
 from golem.robots.worlds.tableware import COLOURS, KINDS
 from golem.training.detector import random_scene
 from golem.training.detector.labels import COLUMNS, label_image
-from golem.training.detector.random_pack import build_pack
-from golem.training.detector.random_scene import Compiled, RandomScene, make_rigs
+from golem.training.detector.random_pack import RandomPack
+from golem.training.detector.random_scene import RandomScene
 from golem.types import Array, CameraInfo
 
 SIZES = 0.25
@@ -41,9 +40,13 @@ GONE = 0.15
 class RandomKitchen(RandomScene):
     """A compiled random kitchen."""
 
-    def __init__(self, world: Compiled, layout: KitchenLayout, parts: tuple[PackPart, ...]) -> None:
-        super().__init__(world, parts)
-        self.layout = layout
+    def __init__(self, rng: np.random.Generator) -> None:
+        """Compile a kitchen with a random counter, things of random sizes, and distractors."""
+        spec, plain = random_scene.begin(rng)
+        raised = float(rng.uniform(-0.15, 0.05))
+        random_counter = rng.random() < 0.5
+        self.layout = draw_counter(rng, raised, sizes=SIZES) if random_counter else draw_kitchen(rng, raised)
+        super().__init__(spec, plain, rng, add_kitchen(spec, self.layout))
 
     def randomise_looks(self, rng: np.random.Generator) -> Conditions:
         """Draw colours of furniture, things, robot and distractors, and the lights; see `RandomScene`."""
@@ -62,8 +65,8 @@ class RandomKitchen(RandomScene):
             model.mat_specular[mat], model.mat_shininess[mat] = rng.uniform((0.1, 0.1), (0.8, 0.8))
         bar = model.material("fridge_bar").id
         model.mat_rgba[bar, :3] = random_scene.random_colour(rng) if wild else rng.choice([0.25, 0.8]) * np.ones(3)
-        random_scene.randomise_robot(self.world, wild, rng)
-        random_scene.randomise_lights(model, rng)
+        self.randomise_robot(wild, rng)
+        self.randomise_lights(rng)
         return draw_conditions("varied", {}, rng)
 
     def randomise_objects(self, rng: np.random.Generator) -> None:
@@ -95,20 +98,19 @@ class RandomKitchen(RandomScene):
                 spot = spot + (0.0, 0.0, radius) - 0.5 * height * turn.as_matrix()[:, 2]
             data.qpos[at : at + 3] = spot
             data.qpos[at + 3 : at + 7] = turn.as_quat(scalar_first=True)
-        random_scene.scatter(self.world, low, high + (0.0, 0.0, 0.012), rng)
-        random_scene.pose_arms(self.world, rng)
+        self.scatter(low, high + (0.0, 0.0, 0.012), rng)
+        self.pose_arms(rng)
 
     def place_head(self, rng: np.random.Generator) -> CameraInfo:
         """Stand the robot before the fridge or along the counter, looking at it; returns the camera."""
         handle = next(part for part in self.parts if part.label == "handle")
         place = handle.position if rng.random() < 0.3 else self._random_place(rng)
         at = np.array([rng.uniform(-0.35, 0.1), place[1] + rng.uniform(-0.4, 0.4), rng.uniform(0.95, 1.15)])
-        random_scene.stand(self.world, at, rng)
-        return CAMERAS["head"]
+        return self.stand(at, rng)
 
     def place_palm(self, rng: np.random.Generator) -> CameraInfo:
         """Carry a palm camera to where it looks at a random part, from above or from ahead; returns the camera."""
-        random_scene.refresh(self.world)
+        self.refresh()
         info = CAMERAS[f"{random_scene.random_side(rng)}_hand"]
         places = {part.geoms: self.data.geom_xpos[self.model.geom(part.geoms[0]).id] for part in self.parts}
         there = tuple(part for part in self.parts if places[part.geoms][2] > 0.0)
@@ -117,7 +119,7 @@ class RandomKitchen(RandomScene):
         distance = float(np.exp(rng.uniform(np.log(0.12), np.log(0.60))))
         pitch = rng.uniform(0.0, 0.35) if part.label == "handle" else rng.uniform(0.2, np.pi / 2)
         view = looking(rng.normal(0.0, 0.4), pitch, rng.uniform(-np.pi, np.pi))
-        random_scene.carry(self.world, info, random_scene.aim(info, target, view, distance, rng))
+        self.carry(info, random_scene.aim(info, target, view, distance, rng))
         return info
 
     def _random_place(self, rng: np.random.Generator) -> Array:
@@ -138,16 +140,7 @@ def looking(heading: float, pitch: float, roll: float) -> Array:
     return turn @ upright @ Rotation.from_euler("z", roll).as_matrix()
 
 
-def build_kitchen(rng: np.random.Generator) -> RandomKitchen:
-    """Compile a kitchen with a random counter, things of random sizes, and distractors."""
-    spec, plain = random_scene.begin(rng)
-    raised = float(rng.uniform(-0.15, 0.05))
-    layout = draw_counter(rng, raised, sizes=SIZES) if rng.random() < 0.5 else draw_kitchen(rng, raised)
-    parts = add_kitchen(spec, layout)
-    return RandomKitchen(random_scene.compile_scene(spec, plain, rng), layout, parts)
-
-
-BUILDERS: dict[str, Callable[[np.random.Generator], RandomScene]] = {"pack": build_pack, "kitchen": build_kitchen}
+BUILDERS: dict[str, Callable[[np.random.Generator], RandomScene]] = {"pack": RandomPack, "kitchen": RandomKitchen}
 """What compiles a world, by its kind."""
 JPEG_QUALITY = 96
 CONDITIONS = ("finish", "cover", "tray", "light")
@@ -191,7 +184,7 @@ def render(
         seed, f"detector/{split}/{world_index}" if kind == "pack" else f"detector/{split}/{kind}/{world_index}"
     )
     scene = BUILDERS[kind](rng)
-    plain, fancy = make_rigs(scene.world)
+    plain, fancy = scene.make_rigs()
     with plain, fancy:
         for k in range(2 * per_camera):
             conditions = scene.randomise_looks(rng)

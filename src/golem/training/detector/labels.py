@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from golem.robots.sensors.cameras import project
 from golem.robots.worlds.pack import PackPart
-from golem.training.detector.random_scene import RandomScene, camera_pose
+from golem.training.detector.random_scene import RandomScene
 from golem.types import Array, CameraInfo
 
 PACK: tuple[str, ...] = ("screw", "screw_hole", "nut", "bus_bar", "tray")
@@ -37,7 +37,7 @@ def label_image(scene: RandomScene, info: CameraInfo, segmentation: NDArray[np.i
         scene: the world at the moment of exposure.
         segmentation: (height, width) geom ids.
     """
-    T_optical_world = np.linalg.inv(camera_pose(scene.world, info.name)).astype(np.float64)
+    T_optical_world = np.linalg.inv(scene.camera_pose(info.name)).astype(np.float64)
     seen = np.bincount(segmentation[segmentation >= 0], minlength=scene.model.ngeom).astype(np.int64)
     rows: list[list[float]] = []
     for part in scene.parts:

@@ -13,11 +13,11 @@ from golem.robots.worlds import hall
 from golem.robots.worlds.conditions import Conditions, draw_conditions
 from golem.robots.worlds.hall import surfaces
 from golem.robots.worlds.layout import PackLayout
-from golem.robots.worlds.pack import PackNames, add_pack
+from golem.robots.worlds.pack import add_pack
 from golem.robots.worlds.pack_part import add_clutter
 from golem.robots.worlds.screws import ScrewDraw, ScrewRanges, draw_screws
 from golem.training.detector import random_scene
-from golem.training.detector.random_scene import Bore, Compiled, RandomScene
+from golem.training.detector.random_scene import Bore, RandomScene
 from golem.types import Array, CameraInfo, Side
 
 WIDE = ScrewRanges(protrusion=(0.004, 0.013))
@@ -31,11 +31,28 @@ CLUTTER = 6
 class RandomPack(RandomScene):
     """A compiled random pack."""
 
-    def __init__(self, world: Compiled, layout: PackLayout, names: PackNames, draws: tuple[ScrewDraw, ...]) -> None:
+    def __init__(self, rng: np.random.Generator) -> None:
+        """Compile a world with random layout, screws and distractors."""
+        spec, plain = random_scene.begin(rng)
+        layout = PackLayout(
+            near_edge=float(rng.uniform(0.2, 0.45)),
+            top_z=float(rng.uniform(0.85, 1.1)),
+            window_x=(float(rng.uniform(0.09, 0.2)), float(rng.uniform(0.5, 0.75))),
+            window_y=(float(rng.uniform(-0.5, -0.3)), float(rng.uniform(0.3, 0.55))),
+            window_depth=float(rng.uniform(0.03, 0.06)),
+            empty_holes=tuple(int(i) for i in rng.choice(68, size=int(rng.integers(10, 22)), replace=False)),
+            tray_size=(float(rng.uniform(0.16, 0.30)), float(rng.uniform(0.2, 0.34)), float(rng.uniform(0.03, 0.08))),
+        )
+        lifted = float(rng.choice([0.0, rng.uniform(0.02, 0.12)]))
+        layout = replace(layout, tray_z=layout.top_z + lifted, tray_xy=(layout.near_edge + 0.1, -0.3))
+        free = [i for i in range(68) if i not in layout.empty_holes]
+        draws = draw_screws(rng, WIDE, [int(i) for i in rng.choice(free, size=14, replace=False)])
+        names = add_pack(spec, layout, draws)
+        add_clutter(spec, layout, int(rng.integers(CLUTTER + 1)), rng)
         pairs = zip(draws, names.mouths, strict=True)
         bores = tuple(Bore(mouth, draw.bore_radius, draw.name) for draw, mouth in pairs)
         tops = {draw.name: draw.head_height for draw in draws}
-        super().__init__(world, names.parts, bores, tops)
+        super().__init__(spec, plain, rng, names.parts, bores, tops)
         self.layout, self.draws = layout, draws
 
     def randomise_looks(self, rng: np.random.Generator) -> Conditions:
@@ -60,8 +77,8 @@ class RandomPack(RandomScene):
             model.mat_rgba[mat, :3] = np.clip(base * tint, 0.0, 1.0)
             model.mat_specular[mat] = np.clip(specular * rng.uniform(0.3, 1.5), 0, 1)
             model.mat_shininess[mat] = np.clip(shininess * rng.uniform(0.5, 1.5), 0, 1)
-        random_scene.randomise_robot(self.world, wild, rng)
-        random_scene.randomise_lights(model, rng)
+        self.randomise_robot(wild, rng)
+        self.randomise_lights(rng)
         return conditions
 
     def randomise_objects(self, rng: np.random.Generator) -> None:
@@ -75,7 +92,7 @@ class RandomPack(RandomScene):
         turn = rng.uniform(-np.pi, np.pi) if rng.random() < 0.3 else rng.normal(0.0, 0.05)
         model.body_quat[tray] = [np.cos(turn / 2), 0.0, 0.0, np.sin(turn / 2)]
         low = np.array([layout.near_edge, -0.7, layout.top_z])
-        random_scene.scatter(self.world, low, low + (0.8, 1.4, 0.012), rng)
+        self.scatter(low, low + (0.8, 1.4, 0.012), rng)
         for draw in self.draws:
             at = model.joint(draw.name).qposadr[0]
             choice = rng.random()
@@ -91,17 +108,16 @@ class RandomPack(RandomScene):
                 data.qpos[at : at + 3] = [*spot, z + draw.head_diameter / 2]
                 lying = Rotation.from_euler("zy", [rng.uniform(-np.pi, np.pi), np.pi / 2 + rng.uniform(0.0, 0.3)])
                 data.qpos[at + 3 : at + 7] = lying.as_quat(scalar_first=True)
-        random_scene.pose_arms(self.world, rng)
+        self.pose_arms(rng)
 
     def place_head(self, rng: np.random.Generator) -> CameraInfo:
         """Stand the robot in front of the pack with its head camera looking down at it; returns the camera."""
         at = np.array([rng.uniform(-0.2, 0.15), rng.uniform(-0.4, 0.4), rng.uniform(0.9, 1.15)])
-        random_scene.stand(self.world, at, rng)
-        return CAMERAS["head"]
+        return self.stand(at, rng)
 
     def place_palm(self, rng: np.random.Generator) -> CameraInfo:
         """Carry a palm camera to where it looks down at a random part, sometimes with a screw in the fingers."""
-        random_scene.refresh(self.world)
+        self.refresh()
         side = random_scene.random_side(rng)
         info = CAMERAS[f"{side}_hand"]
         part = random_scene.random_part(self.parts, rng)
@@ -113,8 +129,8 @@ class RandomPack(RandomScene):
         held = None
         if part.label == "screw" and rng.random() < 0.3:
             held = self.draws[int(rng.integers(len(self.draws)))]
-            random_scene.set_gap(self.world, side, held.head_diameter)
-        random_scene.carry(self.world, info, T_world_optical)
+            self.set_gap(side, held.head_diameter)
+        self.carry(info, T_world_optical)
         if held is not None:
             self._hold(held, side, rng)
         return info
@@ -128,25 +144,4 @@ class RandomPack(RandomScene):
         data.qpos[at : at + 3] = data.site_xpos[site] - R_grip[:, 2] * rng.uniform(0.0, 0.01)
         upright = R_grip @ T_MUJOCO_OPTICAL[:3, :3] @ tilt
         data.qpos[at + 3 : at + 7] = Rotation.from_matrix(upright).as_quat(scalar_first=True)
-        random_scene.refresh(self.world)
-
-
-def build_pack(rng: np.random.Generator) -> RandomPack:
-    """Compile a world with random layout, screws and distractors."""
-    spec, plain = random_scene.begin(rng)
-    layout = PackLayout(
-        near_edge=float(rng.uniform(0.2, 0.45)),
-        top_z=float(rng.uniform(0.85, 1.1)),
-        window_x=(float(rng.uniform(0.09, 0.2)), float(rng.uniform(0.5, 0.75))),
-        window_y=(float(rng.uniform(-0.5, -0.3)), float(rng.uniform(0.3, 0.55))),
-        window_depth=float(rng.uniform(0.03, 0.06)),
-        empty_holes=tuple(int(i) for i in rng.choice(68, size=int(rng.integers(10, 22)), replace=False)),
-        tray_size=(float(rng.uniform(0.16, 0.30)), float(rng.uniform(0.2, 0.34)), float(rng.uniform(0.03, 0.08))),
-    )
-    lifted = float(rng.choice([0.0, rng.uniform(0.02, 0.12)]))
-    layout = replace(layout, tray_z=layout.top_z + lifted, tray_xy=(layout.near_edge + 0.1, -0.3))
-    free = [i for i in range(68) if i not in layout.empty_holes]
-    draws = draw_screws(rng, WIDE, [int(i) for i in rng.choice(free, size=14, replace=False)])
-    names = add_pack(spec, layout, draws)
-    add_clutter(spec, layout, int(rng.integers(CLUTTER + 1)), rng)
-    return RandomPack(random_scene.compile_scene(spec, plain, rng), layout, names, tuple(draws))
+        self.refresh()
