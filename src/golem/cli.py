@@ -47,7 +47,7 @@ def _demo(words: list[str]) -> int:
         from golem.demo_walk import run_walk_demo
 
         return 0 if run_walk_demo(config) else FAILED
-    return 0 if run_demo(config).success else FAILED
+    return 0 if run_demo(config) else FAILED
 
 
 def _run(words: list[str]) -> int:

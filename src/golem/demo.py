@@ -7,7 +7,7 @@ import secrets
 import time
 import webbrowser
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
@@ -84,26 +84,6 @@ class DemoConfig:
     """Write everything public into a bag, a new folder of this name."""
 
 
-@dataclass(frozen=True)
-class DemoResult:
-    """How it went.
-
-    Attributes:
-        success: whether as many screws as asked for are in the tray and the robot never fell, by the simulator's
-            truth, and whether it stood again after the push at the film's end.
-        picks: each attempt.
-        screws: the screws in the tray.
-        films: the films, the WebP first; empty with the live view.
-        report: the HTML page; None where what draws it is not installed.
-    """
-
-    success: bool
-    picks: list[PickRecord]
-    screws: list[str]
-    films: list[Path]
-    report: Path | None
-
-
 class Demo:
     """One demonstration in progress."""
 
@@ -126,14 +106,11 @@ class Demo:
         """Return the screws in the tray."""
         return self._oracle.screws_in_tray()
 
-    def reached(self) -> bool:
-        """Return whether enough screws are in the tray."""
-        return len(self.in_tray()) >= self._config.screws
-
     def over(self) -> bool:
-        """Return whether there is nothing left to try: reached, too many attempts, cancelled, or the robot lost."""
+        """Return whether there is nothing left to try: all are out, too many tries, cancelled, or the robot lost."""
         cancelled = bool(self.picks) and self.picks[-1].stage == CANCELLED
-        return cancelled or self.reached() or self.lost() or len(self.picks) >= 2 * self._config.screws
+        tried = len(self.picks) >= 2 * self._config.screws
+        return cancelled or tried or self.lost() or len(self.in_tray()) >= self._config.screws
 
     def lost(self) -> bool:
         """Return whether the robot fell or was stopped."""
@@ -168,22 +145,12 @@ class Demo:
         result = execute()
         seconds = self._running.executor.t - start
         new = sorted(set(self.in_tray()) - before)
-        self.picks.append(
-            PickRecord(
-                bool(new),
-                new[0] if new else None,
-                result.stage,
-                result.reason,
-                round(start, 3),
-                round(seconds, 3),
-                [(name, round(s, 3)) for name, s in self._timeline.durations(self._running.executor.t)],
-            )
-        )
-        what = (
-            f"{new[0]} is in the tray after {seconds:.1f} s"
-            if new
-            else f"no new screw in the tray; the robot says: {result.reason}"
-        )
+        screw, what = None, f"no new screw in the tray; the robot says: {result.reason}"
+        if new:
+            screw, what = new[0], f"{new[0]} is in the tray after {seconds:.1f} s"
+        stages = [(name, round(s, 3)) for name, s in self._timeline.durations(start + seconds)]
+        times = round(start, 3), round(seconds, 3)
+        self.picks.append(PickRecord(bool(new), screw, result.stage, result.reason, *times, stages))
         print(f"Pick {len(self.picks)}: {what} ({len(self.in_tray())} of {self._config.screws}).", flush=True)
 
     def tick(self) -> None:
@@ -199,9 +166,13 @@ class Demo:
                 self.picture = view.picture("close")
                 view.close()
 
-    def write(self, films: list[Path], poster: NDArray[np.uint8] | None = None) -> DemoResult:
-        """Write figures and report; `poster` stands for the film until it is played."""
-        config, screws, folder = self._config, self.in_tray(), self._config.out
+    def write(self, films: list[Path], poster: NDArray[np.uint8] | None = None) -> bool:
+        """Write figures and report, and return whether all went well; `poster` stands for the film until it is played.
+
+        All went well if as many screws as asked for are in the tray and the robot never fell, by the simulator's truth,
+        and if it stood again after the push at the film's end.
+        """
+        config, screws = self._config, self.in_tray()
         robot_time, wall = self._running.executor.t, time.perf_counter() - self._started
         tries = f"{len(self.picks)} pick{'' if len(self.picks) == 1 else 's'}"
         standing = self._running.stack.on_ground
@@ -226,7 +197,6 @@ class Demo:
             "versions": ", ".join(f"{name} {version}" for name, version in versions().items()),
         }
         balance = balance_figures(self.recorder.trace(), self._pushed_at) if standing else {}
-        report = self._report(lead, films, poster, facts, balance)
         figures = {
             "success": success,
             "screws_in_tray": screws,
@@ -238,36 +208,24 @@ class Demo:
             "wall_time": round(wall, 1),
             **facts,
         }
-        write_file(folder / "demo.json", json.dumps(figures, indent=2) + "\n")
-        print(f"{'Done' if success else 'Failed'}: {lead}")
-        for film in films:
-            print(f"Film:   {film}")
-        if report is not None:
-            print(f"Report: {report}", flush=True)
-        return DemoResult(success, self.picks, screws, films, report)
-
-    def _report(
-        self,
-        lead: str,
-        films: list[Path],
-        poster: NDArray[np.uint8] | None,
-        facts: dict[str, str],
-        balance: dict[str, float],
-    ) -> Path | None:
-        """Write the page; say what is missing where it cannot be drawn."""
-        report = self._config.out / "report.html"
+        report, told = config.out / "report.html", [f"Film:   {film}" for film in films]
         try:
             parts = balance_section(self.recorder.trace(), self._pushed_at, balance) if balance else []
             names = [film.name for film in films]
             write_file(report, demo_page(lead, self.picks, self.picture, names, poster, facts, parts))
+            told.append(f"Report: {report}")
         except MissingExtra as missing:
             print(f"No report was written: {missing}", flush=True)
-            return None
-        return report
+        write_file(config.out / "demo.json", json.dumps(figures, indent=2) + "\n")
+        print(f"{'Done' if success else 'Failed'}: {lead}", *told, sep="\n", flush=True)
+        return success
 
 
-def run_demo(config: DemoConfig) -> DemoResult:
+def run_demo(config: DemoConfig) -> bool:
     """Run the demonstration, print what happens, and write film, report and figures to `config.out`.
+
+    Returns:
+        Whether all went well; see `Demo.write`.
 
     Raises:
         ConfigError: an option is wrong.
@@ -318,17 +276,16 @@ def _goal(config: DemoConfig) -> PickGoal:
     return PickGoal(side="either" if config.layout == "varied" else "right")
 
 
-def _filmed(config: DemoConfig, demo: Demo, running: LockstepRunner, robot: MujocoRobot) -> DemoResult:
+def _filmed(config: DemoConfig, demo: Demo, running: LockstepRunner, robot: MujocoRobot) -> bool:
     """Demonstrate into a film, as fast as the machine can."""
-    film = Film(robot, fps=FPS, recorder=demo.recorder if running.stack.on_ground else None)
     narrator = Narrator(running)
+    with closing(Film(robot, fps=FPS, recorder=demo.recorder if running.stack.on_ground else None)) as film:
 
-    def watch() -> None:
-        narrator()
-        demo.tick()
-        film.tick(running)
+        def watch() -> None:
+            narrator()
+            demo.tick()
+            film.tick(running)
 
-    try:
         while not demo.over():
             film.headline = f"{len(demo.in_tray())} of {config.screws} screws in the tray"
             demo.pick(lambda: running.execute("pick", _goal(config), watch=watch))
@@ -339,11 +296,9 @@ def _filmed(config: DemoConfig, demo: Demo, running: LockstepRunner, robot: Mujo
             demo.push(watch)
         print(f"Writing the film ({len(film)} pictures): a minute or two.", flush=True)
         return demo.write(film.save(config.out / "demo.webp"), film.picture(len(film) // 3))
-    finally:
-        film.close()
 
 
-def _shown(config: DemoConfig, demo: Demo, running: LockstepRunner, view: LiveView) -> DemoResult:
+def _shown(config: DemoConfig, demo: Demo, running: LockstepRunner, view: LiveView) -> bool:
     """Demonstrate in real time in the browser; afterwards the operator may go on until Ctrl-C."""
     print(f"Watch it at {view.url} (it should open by itself).", flush=True)
     webbrowser.open(view.url)
