@@ -43,15 +43,7 @@ UPRIGHT = np.deg2rad(45.0)
 """How far a hand that carries a screw may lean in a third of the queries [rad]."""
 
 
-@dataclass(frozen=True, slots=True)
-class Query:
-    """What a planner is asked."""
-
-    request: PlanRequest
-    kind: str
-
-
-def queries(robot: PlanningRobot, n: int, seed: int) -> Iterator[Query]:
+def queries(robot: PlanningRobot, n: int, seed: int) -> Iterator[PlanRequest]:
     """Yield `n` queries whose start is free and that have a free goal posture; what else is drawn is left out."""
     finder, rng, count = GoalPostures(), np.random.default_rng(seed), 0
     while count < n:
@@ -78,7 +70,7 @@ def queries(robot: PlanningRobot, n: int, seed: int) -> Iterator[Query]:
             ends.append(found[:1] if name == one else found)
         if len(ends) == 2:
             count += 1
-            yield Query(PlanRequest(ends[0][0], ends[1], world, rules, held, seed=count), kind)
+            yield PlanRequest(ends[0][0], ends[1], world, rules, held, seed=count)
 
 
 def pack_world(layout: PackLayout, rng: np.random.Generator) -> World:
@@ -127,27 +119,6 @@ MESH_STEP = 0.05
 """Distance of the postures of a trajectory that are checked with the meshes [rad in a joint]."""
 
 
-@dataclass(frozen=True, slots=True)
-class PlanScore:
-    """How one planner did.
-
-    Attributes:
-        solved: queries with a plan within `WITHIN`.
-        times: (n,) CPU time of each query [s].
-        durations: of the trajectories [s].
-        hits: trajectories that leave free space by the collision model, at steps of 0.01 rad.
-        mesh_hits: trajectories on which links touch by their meshes.
-        beyond: trajectories beyond a limit of position or speed.
-    """
-
-    solved: int
-    times: Array
-    durations: Array
-    hits: int
-    mesh_hits: int
-    beyond: int
-
-
 def planning_table(n: int, seed: int) -> list[Figure]:
     """Measure and print; return the figures."""
     planners: dict[str, ArmPlanner] = {"rrt_connect": RrtConnect(), "straight": Straight()}
@@ -164,32 +135,29 @@ def planning_table(n: int, seed: int) -> list[Figure]:
     )
     figures: list[Figure] = []
     for name, planner in planners.items():
-        score = measure(planner, robot, asked)
-        share = wilson(score.solved, n)
-        ms = 1e3 * np.quantile(score.times, (0.5, 0.95, 0.99))
-        table.add_row(
-            name,
-            f"{score.solved}/{n} [{100 * share.low:.1f}, {100 * share.high:.1f}] %",
-            ", ".join(f"{x:.1f}" for x in ms),
-            f"{np.median(score.durations):.2f}" if len(score.durations) else "-",
-            f"{score.hits} / {score.mesh_hits} / {score.beyond}",
-        )
-        figures.append(figure(f"plan, {name}", score.times, 1e3, "ms", "60 ms wanted"))
+        row, times = measure(planner, robot, asked)
+        table.add_row(name, *row)
+        figures.append(figure(f"plan, {name}", times, 1e3, "ms", "60 ms wanted"))
     Console().print(table)
     return figures
 
 
-def measure(planner: ArmPlanner, robot: PlanningRobot, asked: list[Query]) -> PlanScore:
-    """Put every query to `planner`, and check each answer with what the planner does not use."""
+def measure(planner: ArmPlanner, robot: PlanningRobot, asked: list[PlanRequest]) -> tuple[list[str], Array]:
+    """Put every query to `planner`, and check each answer with what the planner does not use.
+
+    Returns:
+        row: of the table, without the planner's name.
+        times: (n,) CPU time of each query [s].
+    """
     links = our_robot()[1]
     mesh = MeshOracle(links, load_spheres().pairs)
-    planner.plan(replace(asked[0].request))  # compiles, where nothing is cached
+    planner.plan(replace(asked[0]))  # compiles, where nothing is cached
     times, durations = np.empty(len(asked)), list[float]()
     solved = hits = mesh_hits = beyond = 0
     for i, query in enumerate(asked):
         start = time.thread_time()
         try:
-            plan = planner.plan(query.request)
+            plan = planner.plan(query)
         except PlanRefused:
             plan = None
         times[i] = time.thread_time() - start
@@ -198,12 +166,18 @@ def measure(planner: ArmPlanner, robot: PlanningRobot, asked: list[Query]) -> Pl
         solved += times[i] <= WITHIN
         durations.append(float(plan.times[-1]))
         Q = fine_points(plan.times, plan.q, plan.dq)
-        model = robot.model(query.request.held)
-        hits += bool(model.collides_each(Q, 0.0, query.request.world).any())
-        beyond += not within_limits(plan, query.request)
+        model = robot.model(query.held)
+        hits += bool(model.collides_each(Q, 0.0, query.world).any())
+        beyond += not within_limits(plan, query)
         sparse = Q[_every(Q, MESH_STEP)]
         mesh_hits += any(mesh.collides(whole_posture(mesh, q)) for q in sparse)
-    return PlanScore(solved, times, np.array(durations), hits, mesh_hits, beyond)
+    share, ms = wilson(solved, len(asked)), 1e3 * np.quantile(times, (0.5, 0.95, 0.99))
+    return [
+        f"{solved}/{len(asked)} [{100 * share.low:.1f}, {100 * share.high:.1f}] %",
+        ", ".join(f"{x:.1f}" for x in ms),
+        f"{np.median(durations):.2f}" if durations else "-",
+        f"{hits} / {mesh_hits} / {beyond}",
+    ], times
 
 
 def within_limits(plan: Plan, request: PlanRequest) -> bool:

@@ -48,7 +48,7 @@ def compile_kernels() -> None:
     QuickIK().solve("left", grasp_pose(np.array([0.4, 0.2, 0.1]), 1.5), ready[None])
     for query in queries(robot, 4, 0):
         with suppress(PlanRefused):
-            RrtConnect().plan(query.request)
+            RrtConnect().plan(query)
     model, cloud = CollisionModel(load_spheres()), World((), cloud_grid(np.full((4, 3), 0.5)))
     for world in (None, cloud):
         model.collides_each(np.zeros((1, len(model.joints))), 0.0, world)
