@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
-import re
 import shutil
 import textwrap
 import types
@@ -17,14 +16,12 @@ from tyro.conf import Positional, arg
 
 from golem import registry
 from golem.errors import GolemError, unknown_name
-from golem.options import dataclass_in
+from golem.options import dataclass_in, notes
 from golem.slots import KEYS, PARTS, SLOTS
 from golem.stack import SKILLS
 
 REQUIRED = "required"
 """Shown as the default of an option that has none."""
-_ENTRY = re.compile(r"    (\w+(?:, \w+)*)(?: \([^)]*\))?: *(.*)")
-"""An entry of a section of a docstring, cleaned: the names it is about, perhaps their type, and the text."""
 
 
 @dataclass(frozen=True)
@@ -80,9 +77,9 @@ def options_of(cls: type[Any], supplied: tuple[str, ...] = (), default: Any = No
     """
     texts: dict[str, str] = {}
     for one in reversed(cls.__mro__):
-        texts |= _sections(one.__doc__)
+        texts |= notes(one.__doc__)
     if not dataclasses.is_dataclass(cls):
-        texts |= _sections(cls.__init__.__doc__)
+        texts |= notes(cls.__init__.__doc__)
     hints = typing.get_type_hints(cls if dataclasses.is_dataclass(cls) else cls.__init__)
     for name, value in _defaults(cls, default).items():
         if name in supplied:
@@ -153,22 +150,6 @@ def _first_line(cls: type[Any]) -> str:
     """Return the first line of a class's docstring, but not of one that `dataclass` wrote."""
     line = inspect.cleandoc(cls.__doc__ or "").partition("\n")[0]
     return "" if line.startswith(f"{cls.__name__}(") else line
-
-
-def _sections(doc: str | None) -> dict[str, str]:
-    """Return what the sections `Attributes` and `Args` of a docstring in Google style say, by name."""
-    found: dict[str, str] = {}
-    inside, names = False, list[str]()
-    for line in inspect.cleandoc(doc or "").splitlines():
-        entry = _ENTRY.fullmatch(line)
-        if line and not line.startswith(" "):
-            inside, names = line in ("Attributes:", "Args:"), []
-        elif inside and entry is not None:
-            names = entry[1].split(", ")
-            found |= dict.fromkeys(names, entry[2])
-        elif inside:
-            found |= {name: f"{found[name]} {line.strip()}".strip() for name in names}
-    return found
 
 
 def _kind(hint: Any) -> str:

@@ -150,6 +150,16 @@ def require(where: str, *rows: tuple[str, float, bool, str]) -> None:
             raise ConfigError(f"The {where}{what} is {wanted}, not {value:g}.")
 
 
+def notes(doc: str | None) -> dict[str, str]:
+    """Return what the sections `Attributes` and `Args` of a docstring in Google style say, by name."""
+    found: dict[str, str] = {}
+    for section in re.findall(r"^(?:Attributes|Args):((?:\n(?: .*)?)*)", inspect.cleandoc(doc or ""), re.MULTILINE):
+        entries = re.findall(r"^    (\w+(?:, \w+)*)(?: \([^)]*\))?: *(.*(?:\n {5}.*)*)", section, re.MULTILINE)
+        for names, text in entries:
+            found |= dict.fromkeys(names.split(", "), " ".join(text.split()))
+    return found
+
+
 def dataclass_in(hint: Any) -> type[Any] | None:
     """Return the dataclass that a type hint is, or has among its alternatives."""
     if typing.get_origin(hint) in (tuple, list):

@@ -8,7 +8,6 @@ from __future__ import annotations
 import dataclasses
 import inspect
 import math
-import re
 import types
 import typing
 from collections.abc import Callable, Mapping
@@ -17,7 +16,7 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 from golem.errors import ConfigError, GolemError, ModuleFault, shorten
-from golem.options import fill
+from golem.options import fill, notes
 
 K = TypeVar("K")
 Schema = dict[str, Any]
@@ -54,13 +53,13 @@ def schema_of(kind: Any) -> Schema:
     """Return the schema of the dataclass `kind`. Raises TypeError: it is none, or has a field that no goal can have."""
     if not (inspect.isclass(kind) and dataclasses.is_dataclass(kind)):
         raise TypeError(f"{getattr(kind, '__name__', kind)!s} is no dataclass")
-    hints, notes = typing.get_type_hints(kind), _notes(kind)
+    hints, texts = typing.get_type_hints(kind), notes(_doc(kind))
     properties: dict[str, Schema] = {}
     required: list[str] = []
     for row in dataclasses.fields(kind):
         properties[row.name] = of = _of_hint(f"{kind.__name__}.{row.name}", hints[row.name])
-        if row.name in notes:
-            of["description"] = notes[row.name]
+        if row.name in texts:
+            of["description"] = texts[row.name]
         if row.default is not dataclasses.MISSING:
             of["default"] = plain(row.default)
         elif row.default_factory is not dataclasses.MISSING:
@@ -216,12 +215,3 @@ def _doc(kind: type[Any]) -> str:
     """Return what somebody wrote about a class; a dataclass without a docstring is given its signature as one."""
     text = inspect.cleandoc(vars(kind).get("__doc__") or "")
     return "" if text.startswith(f"{kind.__name__}(") else text
-
-
-def _notes(kind: type[Any]) -> dict[str, str]:
-    """Return what the section `Attributes:` of a class's docstring says of each."""
-    _, _, section = _doc(kind).partition("Attributes:\n")
-    notes: dict[str, str] = {}
-    for names, text in re.findall(r"^    (\w+(?:, \w+)*): (.*(?:\n {8}.*)*)", section, re.MULTILINE):
-        notes |= dict.fromkeys(names.split(", "), " ".join(text.split()))
-    return notes
