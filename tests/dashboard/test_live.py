@@ -11,7 +11,7 @@ import pytest
 
 from golem.dashboard import live
 from golem.dashboard.live import PATIENCE, LiveView
-from golem.dashboard.panel import Button
+from golem.dashboard.panel import Button, SkillPanel
 from golem.errors import ConfigError
 from golem.hardware.safety.base import OperatorRequest
 from golem.interfaces import topics
@@ -137,10 +137,18 @@ def test_what_an_agent_asks_for_is_shown_and_answered_by_two_buttons(
     assert not view.panel._question.visible and not any(handle.visible for handle in view.panel._answers)
 
 
+def fill(panel: SkillPanel, name: str, **values: Any) -> None:
+    """Choose a skill, and fill in some fields, as clicks and keys do."""
+    panel._name.value = name
+    panel._show()
+    for key, value in values.items():
+        panel._shown[1][key].value = value
+
+
 def test_a_skill_can_be_started_only_when_none_runs(twin: tuple[LockstepRunner, Any], view: LiveView) -> None:
     running, _ = twin
     until_state(view, running, GateState.ACTIVE)
-    view.panel.skill.fill("stand", seconds=3.0)
+    fill(view.panel.skill, "stand", seconds=3.0)
     run = running.start("stand", StandGoal())
     view.panel.press(Button.START)
     view._serve_buttons()
@@ -153,16 +161,16 @@ def test_a_skill_can_be_started_only_when_none_runs(twin: tuple[LockstepRunner, 
 
 def test_the_form_has_a_field_for_each_of_the_goal(view: LiveView) -> None:
     panel = view.panel.skill
-    panel.fill("pick", label="bolt", side="left")
+    fill(panel, "pick", label="bolt", side="left")
     places = {"avoid": [], "wanted": [], "level": [], "container_at": [], "off": [], "landmarks": []}
     assert panel.chosen == ("pick", {"label": "bolt", "container": "tray", "side": "left"} | places)
-    panel.fill("walk", x=1.5)
+    fill(panel, "walk", x=1.5)
     goal = {"x": 1.5, "y": 0.0, "yaw": 0.0, "frame": "base_link", "timeout": 60.0}
     assert panel.chosen == ("walk", goal)
 
 
 def test_a_goal_without_sense_is_said_and_not_started(twin: tuple[LockstepRunner, Any], view: LiveView) -> None:
-    view.panel.skill.fill("stand", seconds=-1.0)
+    fill(view.panel.skill, "stand", seconds=-1.0)
     view.panel.press(Button.START)
     view._serve_buttons()
     assert view._wanted is None and "zero or more seconds" in view._note

@@ -7,7 +7,8 @@ from typing import Any
 
 import pytest
 
-from golem.dashboard.panel import MEANING, _status_html
+from golem.dashboard.panel import _status_html
+from golem.dashboard.status import GATE_STATES
 from golem.interfaces.payloads import GateState, Reason
 
 
@@ -18,7 +19,7 @@ def status(state: GateState, reason: str = "") -> Any:
 @pytest.mark.parametrize("state", GateState)
 def test_every_state_of_the_gate_has_words(state: GateState) -> None:
     html = _status_html(status(state), [], 1.0, "", False, False)
-    assert MEANING[state] in html
+    assert GATE_STATES[state]["meaning"] in html
     assert ("Start over" in html) is state.stopped
 
 

@@ -18,10 +18,9 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 from tqdm import tqdm
 
-from golem.dashboard.status import SPAN, Status, balance_chart, camera_picture, map_view, read_status
+from golem.dashboard.status import GATE_STATES, SPAN, Status, balance_chart, camera_picture, map_view, read_status
 from golem.errors import OutputError
 from golem.interfaces import topics
-from golem.interfaces.payloads import GateState
 from golem.robots.model.table import BASE_LINK
 from golem.robots.mujoco.balance import BalanceRecorder
 from golem.robots.mujoco.config import WORKSHOPS
@@ -53,14 +52,6 @@ LIVE = (640, 360)
 FILMS = Path("runs/live")
 PANEL = (16, 20, 27)
 INK, MUTED, ACCENT = (240, 242, 245), (150, 160, 173), (255, 196, 0)
-SAFETY_COLOURS = {
-    GateState.ACTIVE: (63, 160, 110),
-    GateState.ARMED: (224, 160, 50),
-    GateState.INIT: (130, 138, 150),
-    GateState.STOP2: (216, 74, 56),
-    GateState.STOP1: (216, 74, 56),
-    GateState.STOP0: (216, 74, 56),
-}
 
 
 def shots(robot: MujocoRobot) -> dict[str, Shot]:
@@ -168,7 +159,7 @@ class Film:
         wide = draw.textlength(word, font=self._fonts[13]) + 34 * unit
         x = width - wide - edge
         draw.rounded_rectangle((x, edge, width - edge, edge + 24 * unit), radius=12 * unit, fill=PANEL)
-        dot = SAFETY_COLOURS[status.safety]
+        dot = tuple(GATE_STATES[status.safety]["film"])
         draw.ellipse((x + 9 * unit, edge + 8 * unit, x + 17 * unit, edge + 16 * unit), fill=dot)
         draw.text((x + 24 * unit, edge + 12 * unit), word, fill=INK, font=self._fonts[13], anchor="lm")
         return np.asarray(image)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from golem.dashboard.arm_panel import ArmPanel
 from golem.dashboard.legs_panel import LegsPanel, legs_html
-from golem.dashboard.status import Status
+from golem.dashboard.status import GATE_STATES, Status
 from golem.dashboard.view_panel import ViewPanel
 from golem.interfaces.payloads import GateState
 from golem.skills.spec import Schema, SkillSpec
@@ -55,14 +55,6 @@ class SkillPanel:
     def hide(self) -> None:
         """Take the controls away, where somebody else starts the skills."""
         self._folder.visible = False
-
-    def fill(self, name: str, **values: Any) -> None:
-        """Choose the skill called `name`, and fill in some fields, as clicks and keys do."""
-        self._name.value = name
-        if self._shown[0] != name:
-            self._show()
-        for key, value in values.items():
-            self._shown[1][key].value = value
 
     def _show(self) -> None:
         """Build the form of the skill that is chosen."""
@@ -106,28 +98,9 @@ def _read(of: Schema, value: Any) -> Any:
 
 
 STAGE_COLOURS = ("#3b7ea1", "#5a9367", "#e0933f", "#c2503a", "#7d5ba6", "#2b9c92", "#8a6d3b")
-SAFETY_COLOURS = {
-    GateState.ACTIVE: "#2e9e63",
-    GateState.ARMED: "#d99a22",
-    GateState.INIT: "#7c8594",
-    GateState.STOP2: "#d0432f",
-    GateState.STOP1: "#d0432f",
-    GateState.STOP0: "#d0432f",
-}
 SMALL = "font-size:12px;opacity:.75"
 RECENT = 9
 """Stages listed in the timeline."""
-
-
-MEANING: dict[GateState, str] = {
-    GateState.INIT: "safety gate: something is missing",
-    GateState.ARMED: "safety gate: the motors damp, until it is activated",
-    GateState.ACTIVE: "safety gate: commands pass, limited",
-    GateState.STOP2: "stopped: the legs stand, the arms damp",
-    GateState.STOP1: "stopped: the motors damp",
-    GateState.STOP0: "stopped: the motors are limp",
-}
-"""What the states of the gate mean."""
 
 
 class Button(StrEnum):
@@ -280,13 +253,13 @@ class Panel:
 def _status_html(
     status: Status, stages: list[tuple[str, float]], factor: float, note: str, paused: bool, standing: bool
 ) -> str:
-    colour = SAFETY_COLOURS[status.safety]
+    meaning, colour = (GATE_STATES[status.safety][key] for key in ("meaning", "panel"))
     parts = [
         '<div style="padding:4px 14px 8px;font-size:14px;line-height:1.4;font-variant-numeric:tabular-nums">',
         f'<div style="{SMALL};display:flex;justify-content:space-between"><span>robot time {status.t:.1f} s</span>'
         f"<span>{'paused' if paused else f'{factor:.2f} x real time'}</span></div>",
         f'<div style="margin:6px 0;padding:4px 10px;border-radius:6px;background:{colour};color:#fff">'
-        f"<b>{escape(MEANING[status.safety])}</b>"
+        f"<b>{escape(meaning)}</b>"
         f'<div style="font-size:12px">{escape(f"{status.safety} {status.reason}".rstrip())}</div></div>',
     ]
     if status.safety.stopped and not note:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -16,11 +17,14 @@ from golem.interfaces import topics
 from golem.interfaces.memory_payloads import RememberedPlace
 from golem.interfaces.payloads import GateState, LegStatus
 from golem.middleware.bus import Bus
+from golem.package_data import load_data
 from golem.robots.mujoco.balance import BalanceTrace
 from golem.robots.mujoco.spectator import SpectatorView
 from golem.runtime.lockstep import LockstepRunner
 from golem.types import Array, BaseEstimate, PlanarPose
 
+GATE_STATES: dict[str, dict[str, Any]] = load_data(__package__, "gate_states.yaml")
+"""What is shown of each state of the safety gate."""
 SPAN = 10.0
 """Time the chart goes back [s]."""
 REACH = 0.15
