@@ -183,11 +183,7 @@ def check_graphics() -> Diagnosis:
 
 
 def require_system() -> None:
-    """Make sure that the native code loads and that MuJoCo can render.
-
-    Raises:
-        MissingSystemLibrary: it does not; the sentence names the line that installs what is missing.
-    """
+    """Check that native code loads and MuJoCo renders. Raises MissingSystemLibrary: no; says what installs it."""
     for check in (check_libraries(), check_graphics()):
         if check.failed:
             raise MissingSystemLibrary(f"{check.found}; type: {check.fix}")

@@ -94,8 +94,7 @@ def read_yaml(text: str, name: str, foreign: bool = False) -> object:
 def check_values(where: str, value: object) -> None:
     """Check that `value`, found at `where`, is made of words, numbers, truth values, lists and mappings by name.
 
-    Raises:
-        ConfigError: it holds something else, or a number that is none.
+    Raises ConfigError: it holds something else, or a number that is none.
     """
     if isinstance(value, Mapping):
         for key, inner in value.items():

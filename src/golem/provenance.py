@@ -80,8 +80,7 @@ _HASH = re.compile("[0-9a-f]{16,64}|absent")
 def stack_facts(stack: Stack) -> dict[str, Any]:
     """Return what a stack contributes to a trial's configuration: itself, its profile's numbers, its files' content.
 
-    Raises:
-        ConfigError, ModuleFault: see `Stack.check`.
+    Raises ConfigError, ModuleFault: see `Stack.check`.
     """
     from golem.robots.sensors.profiles import load_profile
 

@@ -206,8 +206,7 @@ def on_air(
 ) -> AbstractContextManager[Callable[[], None]]:
     """Record a stack into `bag` and serve it to Foxglove; enters what is to be called after every tick.
 
-    Raises:
-        ConfigError, MissingExtra, OutputError: see `broadcast`.
+    Raises ConfigError, MissingExtra, OutputError: see `broadcast`.
     """
     if bag is None and not foxglove:
         return nullcontext(lambda: None)

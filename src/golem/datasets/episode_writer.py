@@ -244,8 +244,7 @@ def _column(values: NDArray[Any], feature: Feature) -> Any:
 def drafts(dataset: DatasetFolder, chosen: Sequence[int] | None = None) -> list[Draft]:
     """Return episodes of a data set, by default all, as those of another one.
 
-    Raises:
-        DatasetError: there is no such episode, a file of one is missing, or it is in a file with others.
+    Raises DatasetError: there is no such episode, a file of one is missing, or it is in a file with others.
     """
     out: list[Draft] = []
     files = [episode.data_file(dataset.info["data_path"]) for episode in dataset.episodes]

@@ -104,8 +104,7 @@ class DatasetFolder:
     def require(self, *names: str, like: Mapping[str, Sequence[str]] | None = None) -> None:
         """Check that it has features, vectors with the names that `like` gives for them.
 
-        Raises:
-            DatasetError: it has not: it is of another robot, or recorded without them.
+        Raises DatasetError: it has not: it is of another robot, or recorded without them.
         """
         for name in names:
             if name not in self.features:

@@ -23,8 +23,7 @@ _UNABLE = (errno.EINVAL, errno.ENOSYS, errno.ENOTSUP)
 def held(root: Path) -> Iterator[None]:
     """Keep other writers away from the folder `root`, and clear away what a writer that was killed left beside it.
 
-    Raises:
-        OutputError: another writer has it, or the place cannot be written.
+    Raises OutputError: another writer has it, or the place cannot be written.
     """
     try:
         root.parent.mkdir(parents=True, exist_ok=True)

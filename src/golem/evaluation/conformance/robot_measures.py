@@ -15,6 +15,7 @@ from golem.evaluation.conformance.base import Candidate, Inapplicable, check
 from golem.evaluation.conformance.robot_rig import OPEN, Path, RobotRig
 from golem.hardware.safety.base import SafetyLimits
 from golem.hardware.servo.gravity import Gravity
+from golem.middleware.wire.convert import rpy
 from golem.robots.model.imu_mount import TORSO
 from golem.robots.model.pinocchio_model import Kinematics
 from golem.robots.model.table import JOINT_INDEX, JOINT_NAMES
@@ -164,7 +165,7 @@ class RobotMeasures:
         """When the torso turns to the left, gyroscope and orientation say so, and by as much as each other."""
         with self.rig(candidate) as rig:
             states = _there_and_back(rig, TORSO, TURN)
-        turned = np.unwrap([_yaw(s.imu.quat) for s in states])
+        turned = np.unwrap([rpy(s.imu.quat)[2] for s in states])
         yaw = float(turned[-1] - turned[0])
         spin = float(np.trapezoid([s.imu.gyro[2] for s in states], [s.t for s in states]))
         joint = float(states[-1].q[TORSO] - states[0].q[TORSO])
@@ -315,11 +316,6 @@ def _there_and_back(rig: RobotRig, joint: int, by: float) -> list[LowState]:
     there = rig.follow(between(home, away, seconds), seconds + STAY)
     rig.follow(between(away, home, seconds), seconds + STAY)
     return there
-
-
-def _yaw(quat: Array) -> float:
-    w, x, y, z = quat.tolist()
-    return float(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
 
 
 def _answered(joint: int, by: float, moved: Array) -> str:

@@ -68,8 +68,7 @@ def torque(motion: RecordedMotion, delay: int) -> Array:
 def find_delay(motion: RecordedMotion) -> tuple[int, Array]:
     """Find by the torques that drives report, those that they give times a gain some ticks later, delay and gain (27,).
 
-    Raises:
-        IdentificationError: drives report no torques, or the commands hardly change.
+    Raises IdentificationError: drives report no torques, or the commands hardly change.
     """
     rows = np.arange(LONGEST_DELAY + LONGEST_REPORT + 1, len(motion.q), 7)
     said = motion.tau[rows]

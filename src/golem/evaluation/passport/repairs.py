@@ -73,8 +73,8 @@ def _orders(d: Description) -> Iterator[Repair]:
     candidates = {
         "of the motors": (*_LEGS, *upper),
         "of Isaac, left and right in turn": (*alternate[:2], upper[0], *alternate[2:], *arms),
+        "with the right leg first": (*_LEGS[6:], *_LEGS[:6], *upper),
     }
-    candidates["with the right leg first"] = (*_LEGS[6:], *_LEGS[:6], *upper)
     for hips in list(permutations(range(3)))[1:]:
         inside = [*hips, 3, 4, 5]
         said = ", ".join(_LEGS[k].removeprefix("left_").removesuffix("_joint") for k in hips)

@@ -54,11 +54,7 @@ ZERO_SPREAD = 0.35
 
 
 def sample_postures(links: Sequence[LinkGeometry], n: int, seed: int, still: Sequence[str] = ()) -> Array:
-    """Return (n, joints) postures: the first half around zero, the others anywhere in the ranges.
-
-    Args:
-        still: joints that stay at zero.
-    """
+    """Return (n, joints) postures: half around zero, the others anywhere in the ranges; `still` are joints at zero."""
     rng = np.random.default_rng(seed)
     moving = free_links(links)
     lower, upper = np.array([link.lower for link in moving]), np.array([link.upper for link in moving])

@@ -40,7 +40,8 @@ def draw_curve(curve: Path, out: Path) -> None:
 
 MATCH_FLOOR = 4.0
 """A centre matches within half the shorter side of the true box, or within this [px], whichever is more."""
-THRESHOLD = 0.05
+THRESHOLD, WORKING = 0.05, 0.3
+"""Least score of a detection at all, and of those whose recall, precision and error are told."""
 BY_CONDITION = (("head", "screw"), ("palm", "screw"), ("head", "tray"))
 """Camera and class of the figures that are told for each condition."""
 
@@ -54,7 +55,7 @@ class Score:
     Attributes:
         count: labelled parts.
         ap: average precision (area under the precision-recall curve, all points).
-        recall: share found at a score of 0.3 or more.
+        recall: share found at a score of `WORKING` or more.
         precision: share of those detections that are right.
         error: median distance of the matched centres at that score [px].
         error_p95: 95th percentile of it [px].
@@ -69,14 +70,13 @@ class Score:
 
 
 def evaluate(
-    data: Sequence[Labelled], detect: Detector, working_score: float = 0.3, classes: Sequence[str] = CLASSES
+    data: Sequence[Labelled], detect: Detector, classes: Sequence[str] = CLASSES
 ) -> dict[tuple[str, str], Score]:
     """Return the figures by (camera, class).
 
     Args:
         data: held-out images.
         detect: image RGB to detections of all classes at scores from `THRESHOLD`.
-        working_score: for recall, precision and error.
         classes: of the labels, in their order.
     """
     hits: dict[tuple[str, str], list[tuple[float, bool, float]]] = {}
@@ -88,14 +88,12 @@ def evaluate(
             truth = labels[labels[:, 0] == kind]
             counts[key] = counts.get(key, 0) + int((truth[:, 7] == 0).sum())
             hits.setdefault(key, []).extend(_match([d for d in found if d.label == label], truth))
-    return {key: _score(hits[key], counts[key], working_score) for key in sorted(counts)}
+    return {key: _score(hits[key], counts[key]) for key in sorted(counts)}
 
 
-def false_alarms(
-    data: Sequence[Labelled], detect: Detector, classes: Sequence[str], working_score: float = 0.3
-) -> float:
+def false_alarms(data: Sequence[Labelled], detect: Detector, classes: Sequence[str]) -> float:
     """Return how many detections of `classes` an image has on average where there are no such things."""
-    count = sum(d.label in classes and d.score >= working_score for one in data for d in detect(one.image))
+    count = sum(d.label in classes and d.score >= WORKING for one in data for d in detect(one.image))
     return count / max(len(data), 1)
 
 
@@ -123,14 +121,14 @@ def _lies_on(center: Array, labels: Array) -> bool:
     return bool(((labels[:, 3:5] - MATCH_FLOOR <= center) & (center <= labels[:, 5:7] + MATCH_FLOOR)).all(axis=1).any())
 
 
-def _score(hits: list[tuple[float, bool, float]], count: int, working_score: float) -> Score:
+def _score(hits: list[tuple[float, bool, float]], count: int) -> Score:
     hits = sorted(hits, reverse=True)
     good = np.cumsum([h[1] for h in hits]) if hits else np.zeros(0)
     precision = good / np.arange(1, len(hits) + 1)
     envelope = np.maximum.accumulate(precision[::-1])[::-1]
     steps = np.array([h[1] for h in hits], bool)
     ap = float(envelope[steps].sum() / max(count, 1)) if hits else 0.0
-    working = [h for h in hits if h[0] >= working_score]
+    working = [h for h in hits if h[0] >= WORKING]
     right = [h[2] for h in working if h[1]]
     return Score(
         count=count,

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import tyro
 from numpy.typing import NDArray
+from scipy.stats import mannwhitneyu
 
 from golem.capabilities.grasping.hand_view import FACTS, SEEN, mirrored
 from golem.capabilities.grasping.scorer import GraspNet, load_net
@@ -79,9 +80,7 @@ def auc(scores: NDArray[np.floating], held: NDArray[np.bool_]) -> float:
     good, bad = int(held.sum()), int((~held).sum())
     if not good or not bad:
         return float("nan")
-    _, index, counts = np.unique(scores, return_inverse=True, return_counts=True)
-    ranks = (np.cumsum(counts) - 0.5 * (counts - 1))[index]
-    return float((ranks[held].sum() - 0.5 * good * (good + 1)) / (good * bad))
+    return float(mannwhitneyu(scores[held], scores[~held]).statistic / (good * bad))
 
 
 def first_held(scores: NDArray[np.floating], labels: GraspLabels) -> float:

@@ -95,15 +95,9 @@ def build_model() -> tuple[mujoco.MjModel, Ids]:
 
 def _strip(spec: mujoco.MjSpec) -> None:
     """Remove what costs time and teaches nothing: pictures, cameras, moving fingers, the IMU's noise-free sensors."""
-    for equality in list(spec.equalities):
-        spec.delete(equality)
-    for sensor in list(spec.sensors):
-        spec.delete(sensor)
-    for camera in list(spec.cameras):
-        spec.delete(camera)
-    for geom in list(spec.geoms):
-        if geom.group != mjcf.COLLISION_GROUP:
-            spec.delete(geom)
+    seen = [geom for geom in spec.geoms if geom.group != mjcf.COLLISION_GROUP]
+    for element in (*spec.equalities, *spec.sensors, *spec.cameras, *seen):
+        spec.delete(element)
     for side in SIDES:
         for finger in magpie_model.FINGERS:
             crank = magpie_model.finger_names(side, finger)[0]
