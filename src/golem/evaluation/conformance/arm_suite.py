@@ -12,7 +12,7 @@ from golem.capabilities.arms.base import NUM_UPPER, TargetError, UpperBody
 from golem.errors import ModuleFault
 from golem.evaluation.conformance import samples
 from golem.evaluation.conformance.base import Candidate, check
-from golem.evaluation.conformance.suite import Suite
+from golem.evaluation.conformance.suite import Suite, check_fields
 from golem.interfaces.payloads import ArmCommand
 from golem.robots.model.pinocchio_model import Kinematics
 from golem.robots.model.table import load_limits
@@ -87,10 +87,7 @@ class ArmSuite(Suite):
 
     def judge(self, contract: ContractCheck, answer: Any) -> None:
         contract.kind("the arm command", answer, ArmCommand)
-        contract.array("q", answer.q, NUM_UPPER)
-        contract.array("error_position", answer.error_position, 2)
-        contract.array("error_rotation", answer.error_rotation, 2)
-        contract.number("limited", answer.limited)
+        check_fields(contract, answer, q=(NUM_UPPER,), error_position=(2,), error_rotation=(2,), limited=())
 
     @check
     def targets_keep_the_limits(self, candidate: Candidate) -> None:

@@ -114,20 +114,16 @@ class Report:
         return self.lacks is None and not self.failed
 
 
-def check(function: F) -> F:
+def check(function: F, gate: bool = False) -> F:
     """Make a method of a suite one of its checks; the docstring is the promise."""
-    return _marked(function, gate=False)
+    promise = (inspect.getdoc(function) or "").partition("\n")[0]
+    setattr(function, "_check", Check(function.__name__, promise, gate, function))  # noqa: B010
+    return function
 
 
 def gate(function: F) -> F:
     """Make a method of a suite a check without which the others mean nothing."""
-    return _marked(function, gate=True)
-
-
-def _marked(function: F, gate: bool) -> F:
-    promise = (inspect.getdoc(function) or "").partition("\n")[0]
-    setattr(function, "_check", Check(function.__name__, promise, gate, function))  # noqa: B010
-    return function
+    return check(function, gate=True)
 
 
 def checks_of(suite: type[Any]) -> tuple[Check, ...]:

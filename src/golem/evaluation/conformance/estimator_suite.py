@@ -9,7 +9,7 @@ import numpy as np
 
 from golem.evaluation.conformance import samples
 from golem.evaluation.conformance.base import Candidate, check
-from golem.evaluation.conformance.suite import Suite
+from golem.evaluation.conformance.suite import Suite, check_fields
 from golem.hardware.estimator.base import BaseEstimator
 from golem.runtime.contract_check import ContractCheck
 from golem.types import TICK, BaseEstimate, LowState
@@ -47,11 +47,7 @@ class EstimatorSuite(Suite):
 
     def judge(self, contract: ContractCheck, answer: Any) -> None:
         contract.kind("the estimate", answer, BaseEstimate)
-        contract.array("T_odom_base", answer.T_odom_base, 4, 4)
-        contract.array("velocity", answer.velocity, 3)
-        contract.array("contact", answer.contact, 2)
-        contract.number("height", answer.height)
-        contract.number("t", answer.t)
+        check_fields(contract, answer, T_odom_base=(4, 4), velocity=(3,), contact=(2,), height=(), t=())
 
     @check
     def poses_are_rigid(self, candidate: Candidate) -> None:

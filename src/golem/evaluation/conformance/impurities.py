@@ -17,26 +17,11 @@ from typing import Any
 
 import numpy as np
 
+from golem.package_data import load_data
 from golem.traces import caller
 
 CLOCK, FILE, THREAD, RANDOM = "clock", "file", "thread", "random"
-_WATCHED: dict[str, dict[str, set[str]]] = {
-    CLOCK: {
-        "time": {
-            *("time", "time_ns", "monotonic", "monotonic_ns", "perf_counter", "perf_counter_ns", "sleep"),
-            *("process_time", "process_time_ns", "thread_time", "localtime", "gmtime", "ctime", "strftime"),
-        }
-    },
-    FILE: {
-        "io": {"open"},
-        "_io": {"open"},
-        "posix": {"open", "listdir", "scandir", "mkdir", "remove", "unlink", "rename", "replace", "system"},
-        "_socket": {"getaddrinfo"},
-        "_posixsubprocess": {"fork_exec"},
-    },
-    THREAD: {"_thread": {"start_new_thread", "start_joinable_thread"}, "posix": {"fork", "forkpty"}},
-    RANDOM: {"posix": {"urandom"}},
-}
+_WATCHED: dict[str, dict[str, list[str]]] = load_data(__package__, "impurities.yaml")
 _FUNCTIONS = {(module, name): kind for kind, of in _WATCHED.items() for module, names in of.items() for name in names}
 _PACKAGES = tuple({f"{sysconfig.get_path(name)}/" for name in ("purelib", "platlib")})
 _METHODS = {(datetime.datetime, name): CLOCK for name in ("now", "utcnow")} | {(datetime.date, "today"): CLOCK}

@@ -13,7 +13,7 @@ from golem.capabilities.legs.gait import GaitConfig
 from golem.evaluation.conformance import samples
 from golem.evaluation.conformance.base import Candidate, check
 from golem.evaluation.conformance.still_robot import StillOnboard
-from golem.evaluation.conformance.suite import Suite
+from golem.evaluation.conformance.suite import Suite, check_fields
 from golem.interfaces.payloads import LegCommand
 from golem.robots.model.table import load_limits
 from golem.runtime.contract_check import ContractCheck
@@ -106,10 +106,8 @@ class LegSuite(Suite):
 
     def judge(self, contract: ContractCheck, answer: Any) -> None:
         contract.kind("the leg command", answer, LegCommand)
-        for name in ("q", "kp", "kd"):
-            contract.array(name, getattr(answer, name), JOINTS)
-        if answer.tau is not None:
-            contract.array("tau", answer.tau, JOINTS)
+        own = {} if answer.tau is None else {"tau": (JOINTS,)}
+        check_fields(contract, answer, q=(JOINTS,), kp=(JOINTS,), kd=(JOINTS,), **own)
 
     @check
     def targets_are_angles_of_joints(self, candidate: Candidate) -> None:

@@ -12,7 +12,7 @@ from golem.capabilities.perception.base import Localizer
 from golem.errors import ConfigError, ModuleFault
 from golem.evaluation.conformance import samples
 from golem.evaluation.conformance.base import Candidate, Inapplicable, check
-from golem.evaluation.conformance.suite import Suite
+from golem.evaluation.conformance.suite import Suite, check_fields
 from golem.robots.sensors.cameras import HEAD, RIGHT_HAND
 from golem.runtime.contract_check import ContractCheck
 from golem.types import TICK, Detection, LocalizedObject, Mask, RgbdImage
@@ -83,9 +83,7 @@ class LocalizerSuite(Suite):
             contract.number("its score", found.detection.score, minimum=0.0)
             contract.array("its box", found.detection.box, 4)
             contract.array("its centre", found.detection.center, 2)
-            contract.number("t", found.t)
-            contract.array("position", found.position, 3)
-            contract.array("points", found.points, None, 3)
+            check_fields(contract, found, t=(), position=(3,), points=(None, 3))
             if found.mask is not None:
                 contract.kind("its mask", found.mask, Mask)
                 pixels = int(np.count_nonzero(found.mask.pixels))

@@ -16,7 +16,7 @@ from golem.capabilities.planning.joint_space import JointSpace, PlanningRobot
 from golem.capabilities.planning.path_planner import fine_points
 from golem.evaluation.conformance import samples
 from golem.evaluation.conformance.base import Candidate, check
-from golem.evaluation.conformance.suite import Suite
+from golem.evaluation.conformance.suite import Suite, check_fields
 from golem.interfaces.payloads import JointTrajectory
 from golem.runtime.contract_check import ContractCheck
 
@@ -72,9 +72,7 @@ class PlannerSuite(Suite):
             return
         contract.kind("the plan", answer, Plan)
         n = len(answer.times)
-        contract.array("times", answer.times, n)
-        contract.array("q", answer.q, n, 15)
-        contract.array("dq", answer.dq, n, 15)
+        check_fields(contract, answer, times=(n,), q=(n, 15), dq=(n, 15))
 
     @check
     def meets_start_and_goal(self, candidate: Candidate) -> None:

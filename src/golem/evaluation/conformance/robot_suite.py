@@ -12,7 +12,7 @@ from golem.capabilities.arms.base import check_pose
 from golem.evaluation.conformance.base import Candidate, check
 from golem.evaluation.conformance.robot_measures import RobotMeasures
 from golem.evaluation.conformance.robot_rig import RobotRig
-from golem.evaluation.conformance.suite import Suite
+from golem.evaluation.conformance.suite import Suite, check_fields
 from golem.robots.base import Robot
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.lockstep import start_posture
@@ -90,13 +90,10 @@ class RobotSuite(RobotMeasures, Suite):
         for name, values in zip(("q", "dq", "tau"), answer.joints, strict=True):
             contract.array(name, values, NUM_JOINTS)
         contract.kind("the IMU's sample", answer.imu, Imu)
-        for name, length in (("quat", 4), ("gyro", 3), ("acc", 3)):
-            contract.array(name, getattr(answer.imu, name), length)
+        check_fields(contract, answer.imu, quat=(4,), gyro=(3,), acc=(3,))
         for hand in answer.hands:
             contract.kind("the hand's report", hand, HandState)
-            contract.number("gap", hand.gap)
-            contract.array("fingers", hand.fingers, 2)
-            contract.array("force", hand.force, 2)
+            check_fields(contract, hand, gap=(), fingers=(2,), force=(2,))
 
     @check
     def attitude_is_a_rotation(self, candidate: Candidate) -> None:

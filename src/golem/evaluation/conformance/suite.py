@@ -62,6 +62,13 @@ WARM_UP = 2
 """Calls whose time does not count: caches fill, libraries load."""
 
 
+def check_fields(contract: ContractCheck, answer: Any, **shapes: tuple[int | None, ...]) -> None:
+    """Check fields of an answer: finite arrays of `shapes`, finite numbers where a shape is empty; as `judge` does."""
+    for name, shape in shapes.items():
+        value = getattr(answer, name)
+        contract.array(name, value, *shape) if shape else contract.number(name, value)
+
+
 class Suite:
     """The suite of one slot. A subclass says how its modules are called; the checks here ask the rest.
 
