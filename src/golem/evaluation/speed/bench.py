@@ -19,14 +19,20 @@ from golem.capabilities.arms.arm_kinematics import UpperKinematics
 from golem.capabilities.arms.base import UpperBody
 from golem.capabilities.arms.diff_ik import DiffIK
 from golem.capabilities.arms.postures import posture
+from golem.capabilities.mapping.voxel_grid import VoxelGridMapper
+from golem.capabilities.navigation.astar import Way, astar
+from golem.capabilities.navigation.costmap import INSCRIBED, Costmap
+from golem.capabilities.navigation.footprint import HOME
+from golem.capabilities.navigation.local_controller import Around, LocalController, LocalControllerConfig
 from golem.errors import ConfigError, GolemError, MissingExtra
-from golem.evaluation.speed.navigation_bench import navigation_times
+from golem.evaluation.conformance.room import ROOM, MadeWalk
 from golem.hardware.estop.estop_config import VirtualEstop
 from golem.hardware.safety.base import GateInputs, OperatorRequest, SafetyLimits
 from golem.hardware.safety.gate import Gate, check
 from golem.hardware.safety.memory import GateMemory
 from golem.hardware.servo.servo import Servo
 from golem.interfaces import public
+from golem.interfaces.nav_payloads import OccupancyGrid
 from golem.interfaces.payloads import EstopMessage, GateState
 from golem.interfaces.ros_convert import base_estimate
 from golem.middleware.dds.local import LocalDomain
@@ -42,7 +48,7 @@ from golem.runtime.lockstep import build, start_posture
 from golem.runtime.perception_nodes import CameraNode, LocalizerNode
 from golem.skills.pick_config import PickGoal
 from golem.stack import load_stack
-from golem.types import NUM_JOINTS, TICK, UPPER, Array, BaseEstimate, Imu, LowCommand, LowState, RgbdImage
+from golem.types import NUM_JOINTS, TICK, UPPER, Array, BaseEstimate, Imu, LowCommand, LowState, PlanarPose, RgbdImage
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,6 +213,43 @@ def _perception(config: BenchConfig) -> list[Figure]:
 def _navigation(config: BenchConfig) -> list[Figure]:
     rows = navigation_times(timed, 10 if config.quick else 60)
     return [figure(name, times, 1e3, "ms", reference) for name, times, reference in rows]
+
+
+SIDE, BOXES = 400, 60
+"""Cells along each side of the map, and boxes of 1 m on it."""
+
+
+def navigation_times(timed: Callable[[Callable[[int], object], int], Array], n: int) -> list[tuple[str, Array, str]]:
+    """Return names, CPU times of `n` repetitions by `timed` [s], and what they are compared with."""
+    rng = np.random.default_rng(0)
+    cells = np.zeros((SIDE, SIDE), np.int8)
+    for r, c in rng.integers(20, SIDE - 40, (BOXES, 2)):
+        cells[r : r + 20, c : c + 20] = 100
+    grid = OccupancyGrid(0.0, PlanarPose(0.0, 0.0, 0.0), 0.05, cells)
+    costmap = Costmap(grid, np.zeros((0, 2)), 0.3)
+    walk, mapper = MadeWalk(ROOM, still=1e3, every=1), VoxelGridMapper()
+    scans = walk.base_scans(n + 3, np.random.default_rng(1))
+    for scan in scans[:3]:
+        mapper.add_scan(scan)
+    mapper.grid()
+
+    def search(i: int) -> object:
+        return astar(costmap.cost, (2, 2), (SIDE - 3, SIDE - 3), 0.02, INSCRIBED)
+
+    local, pose, goal = (LocalController(LocalControllerConfig()), PlanarPose(1.0, 1.0, 0.8), PlanarPose(4.0, 4.0, 0.0))
+    way, frame = Way(np.linspace((1.0, 1.0), (4.0, 4.0), 80)), np.array([0.0, 0.0, 1.0, 0.0, 0.05])
+
+    def follow(i: int) -> object:
+        return local.follow(pose, way, goal, HOME, Around(costmap.clearance, frame))
+
+    search(0)
+    follow(0)
+    return [
+        ("map: one scan of 20,000 points", timed(lambda i: mapper.add_scan(scans[i + 3]), n), "100 ms: 10 Hz"),
+        ("costmap of 400 x 400", timed(lambda i: Costmap(grid, np.zeros((0, 2)), 0.3), n), "100 ms: 10 Hz"),
+        ("A* over 400 x 400, corner to corner", timed(search, n), "20 ms (issue 28)"),
+        ("local controller: one twist", timed(follow, n), "50 ms: 20 Hz"),
+    ]
 
 
 def _robot(config: BenchConfig) -> list[Figure]:

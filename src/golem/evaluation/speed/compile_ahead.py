@@ -26,7 +26,7 @@ from golem.capabilities.planning.base import PlanRefused
 from golem.capabilities.planning.joint_space import PlanningRobot
 from golem.capabilities.planning.rrt_connect import RrtConnect
 from golem.evaluation.speed.arms_bench import queries
-from golem.evaluation.speed.navigation_bench import navigation_times
+from golem.evaluation.speed.bench import navigation_times
 from golem.kernels import stamp_of_all
 from golem.runtime.lockstep import build
 from golem.stack import load_stack
