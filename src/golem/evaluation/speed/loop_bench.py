@@ -5,6 +5,7 @@ Every figure comes from a process of its own (`loop_measure`), so that another c
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import os
 import statistics
@@ -26,6 +27,10 @@ from golem.evaluation.speed.loop_measure import CASES
 
 HERE, THERE = "this", "other"
 """What two checkouts are called."""
+PLAIN = 4.0
+"""Robot time of the loop without a stack [s]."""
+WARP_STEPS = 200
+"""Physics steps of mjlab's."""
 
 
 @dataclass(frozen=True)
@@ -65,12 +70,15 @@ def run_loop_bench(config: LoopBenchConfig) -> dict[str, Any]:
             raise ConfigError(f"--against {config.against} is no checkout: it has no src/golem.")
     console = Console()
     found = {name: _measured(name, trees, config) for name in config.stack}
+    first = found[config.stack[0]][HERE]
     console.print(_rates(found))
     if config.against is not None:
         console.print(_ratios(found))
     for name, by_tree in found.items():
         console.print(_nodes(name, by_tree))
-    console.print(_start(found[config.stack[0]][HERE]["start"]))
+    console.print(_start(first["start"]))
+    console.print(f"Without a stack, NumPy PD and mj_step in Python: {first['plain']:.3g} robot s / CPU s.")
+    console.print(_mjlab(trees[HERE]))
     if config.json:
         print(json.dumps(found))
     return found
@@ -118,7 +126,7 @@ def _measured(name: str, trees: dict[str, Path], config: LoopBenchConfig) -> dic
         found: dict[str, dict[str, Any]] = {}
         for tree, worker in workers.items():
             # What is not timed to the percent comes first: kernels are loaded meanwhile.
-            found[tree] = {"start": worker.ask("start")}
+            found[tree] = {"start": worker.ask("start"), "plain": worker.ask("plain", PLAIN)["rate"]}
             found[tree]["calls"] = worker.ask("calls", min(seconds, 2.0), seed)["calls"]
             found[tree] |= {"by_node": worker.ask("nodes", seconds, seed), "rates": [], "shares": []}
         for _ in range(config.repetitions):
@@ -175,3 +183,13 @@ def _start(steps: dict[str, float]) -> Table:
 def _spread(values: Iterable[float], unit: str = "") -> str:
     these: Sequence[float] = list(values)
     return f"{statistics.median(these):.3g}{unit} ({min(these):.3g} - {max(these):.3g})"
+
+
+def _mjlab(source: Path) -> str:
+    """Return how fast mjlab's physics is with one robot, or why that is left out."""
+    missing = [name for name in ("mujoco_warp", "warp") if importlib.util.find_spec(name) is None]
+    if missing:
+        return f"mjlab's physics is left out: {missing[0]} is not installed."
+    with Worker(source, "mjlab") as worker:
+        warp = worker.ask("warp", WARP_STEPS)
+    return f"mjlab's physics, one robot, on {warp['device']}: {warp['rate']:.3g} robot s / s of the wall clock."

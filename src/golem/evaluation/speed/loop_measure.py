@@ -230,14 +230,58 @@ def start_up() -> dict[str, float]:
     return steps
 
 
+def plain_loop(seconds: float) -> dict[str, float]:
+    """Return robot seconds per CPU second of a loop of unitree_mujoco's kind: NumPy PD and `mj_step`, our model."""
+    import mujoco
+    import numpy as np
+
+    from golem.evaluation.episodes.episode import legs_stack
+    from golem.runtime.lockstep import build_robot, start_posture
+
+    robot = build_robot(legs_stack("almi", "field"), 0)
+    model, data, q = robot.data.model, robot.data, start_posture(on_ground=True)
+    motors = [model.actuator(i).trnid[0] for i in range(len(q))]
+    at, rate = model.jnt_qposadr[motors], model.jnt_dofadr[motors]
+    start = time.thread_time()
+    for _ in range(round(seconds / TICK)):
+        tau = 3000.0 * (q - data.qpos[at]) - 40.0 * data.qvel[rate]
+        data.ctrl[: len(q)] = np.clip(tau, -300.0, 300.0)
+        mujoco.mj_step(model, data)
+    spent = time.thread_time() - start
+    robot.close()
+    return {"rate": seconds / spent}
+
+
+def warp_loop(steps: int) -> dict[str, Any]:
+    """Return mjlab's robot seconds per second (MuJoCo Warp, one robot of ours), and its device. Raises ImportError."""
+    from golem.evaluation.episodes.episode import legs_stack
+    from golem.runtime.lockstep import build_robot
+
+    mujoco_warp, warp = (importlib.import_module(name) for name in ("mujoco_warp", "warp"))
+    robot = build_robot(legs_stack("almi", "field"), 0)
+    model = mujoco_warp.put_model(robot.data.model)
+    data = mujoco_warp.put_data(robot.data.model, robot.data, nworld=1)
+    mujoco_warp.step(model, data)  # compiles
+    warp.synchronize()
+    start = time.perf_counter()
+    for _ in range(steps):
+        mujoco_warp.step(model, data)
+    warp.synchronize()
+    return {"rate": steps * TICK / (time.perf_counter() - start), "device": str(warp.get_device())}
+
+
 def main(name: str) -> None:
-    """Answer what comes in: `start`, `rss` or `MODE SECONDS SEED`."""
+    """Answer what comes in: `start`, `plain SECONDS`, `warp STEPS`, `rss` or `MODE SECONDS SEED`."""
     answers = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)  # what libraries print is no answer
     for line in sys.stdin:
         word, *numbers = line.split()
         if word == "start":
             answer: Any = start_up()
+        elif word == "plain":
+            answer = plain_loop(float(numbers[0]))
+        elif word == "warp":
+            answer = warp_loop(int(numbers[0]))
         elif word == "rss":
             unit = 2**20 if sys.platform == "darwin" else 2**10
             answer = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
