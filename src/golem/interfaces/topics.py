@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
+from typing import TypeVar
 
 from golem.interfaces import nav_payloads, payloads
 from golem.interfaces.lidar import ExternalOdometry, LidarImu, LidarScan
@@ -10,7 +12,9 @@ from golem.interfaces.memory_payloads import MemoryStatus, RememberedPlaces, Sho
 from golem.interfaces.unitree_api import ArmSdkCommand
 from golem.middleware.bus import Topic
 from golem.middleware.wire.api import ApiRequest, Response, request_topic, response_topic
-from golem.types import BaseEstimate, HandCommand, HandState, LowCommand, LowState, PalmTargets, RgbdImage, Side, Twist
+from golem.types import BaseEstimate, HandCommand, HandState, LowCommand, LowState, PalmTargets, RgbdImage, Twist
+
+T = TypeVar("T")
 
 LOW_STATE = Topic("lowstate", LowState)
 """At 500 Hz, from the robot."""
@@ -90,61 +94,28 @@ ONBOARD_LEGS = Topic("onboard/legs", payloads.LegCommand)
 """From the on-board leg controller."""
 
 
-@cache
-def hand_state(side: Side) -> Topic[HandState]:
-    """Return the stream of what one hand reports."""
-    return Topic(f"{side}/gripper/state", HandState)
+def _of_each(name: str, kind: type[T]) -> Callable[[str], Topic[T]]:
+    """Return what gives the stream of one hand, service or camera, whose own name `name` holds."""
+    return cache(lambda which: Topic(name.format(which), kind))
 
 
-@cache
-def hand_command(side: Side) -> Topic[HandCommand]:
-    """Return the stream of what one hand is told."""
-    return Topic(f"{side}/gripper/command", HandCommand)
-
-
-@cache
-def hand_goal(side: Side) -> Topic[payloads.HandGoal]:
-    """Return the stream on which a skill tells one hand what to do."""
-    return Topic(f"{side}/gripper/goal", payloads.HandGoal)
-
-
-@cache
-def hand_status(side: Side) -> Topic[payloads.HandStatus]:
-    """Return the stream of what a hand's controller found."""
-    return Topic(f"{side}/gripper/status", payloads.HandStatus)
-
-
-@cache
-def api_request(service: str) -> Topic[ApiRequest]:
-    """Return the stream of calls to one service of the on-board computer."""
-    return Topic(request_topic(service), ApiRequest)
-
-
-@cache
-def api_response(service: str) -> Topic[Response]:
-    """Return the stream of answers of one service of the on-board computer."""
-    return Topic(response_topic(service), Response)
-
-
-@cache
-def exposures(camera: str) -> Topic[payloads.Exposure]:
-    """Return the stream of what one camera saw."""
-    return Topic(f"exposures/{camera}", payloads.Exposure)
-
-
-@cache
-def rgbd_images(camera: str) -> Topic[RgbdImage]:
-    """Return the stream of the posed images of one camera."""
-    return Topic(f"realsense/{camera}", RgbdImage)
-
-
-@cache
-def detection_request(camera: str) -> Topic[payloads.DetectionRequest]:
-    """Return the stream on which a skill asks for detections of one camera."""
-    return Topic(f"look/{camera}", payloads.DetectionRequest)
-
-
-@cache
-def detections(camera: str) -> Topic[payloads.Detections]:
-    """Return the stream of what was detected in the images of one camera."""
-    return Topic(f"objects/{camera}", payloads.Detections)
+hand_state = _of_each("{}/gripper/state", HandState)
+"""What the hand of a side reports."""
+hand_command = _of_each("{}/gripper/command", HandCommand)
+"""What it is told."""
+hand_goal = _of_each("{}/gripper/goal", payloads.HandGoal)
+"""From a skill: what it is to do."""
+hand_status = _of_each("{}/gripper/status", payloads.HandStatus)
+"""What its controller found."""
+api_request = _of_each(request_topic("{}"), ApiRequest)
+"""Calls to a service of the on-board computer."""
+api_response = _of_each(response_topic("{}"), Response)
+"""Its answers."""
+exposures = _of_each("exposures/{}", payloads.Exposure)
+"""What a camera saw."""
+rgbd_images = _of_each("realsense/{}", RgbdImage)
+"""Its posed images."""
+detection_request = _of_each("look/{}", payloads.DetectionRequest)
+"""From a skill: what to look for in them."""
+detections = _of_each("objects/{}", payloads.Detections)
+"""What was detected in them."""
