@@ -127,11 +127,9 @@ class CycloneWriter(_Endpoint):
             self._check(code, "write")
 
     def matched(self) -> int:
-        """Return how many readers match now."""
         return max(0, self._calls.dds_get_matched_subscriptions(self.entity, None, 0))
 
     def readers(self) -> dict[int, bytes]:
-        """Return the guid of every reader that matches now, by its instance handle."""
         calls = self._calls
         return self._peers(calls.dds_get_matched_subscriptions, calls.dds_get_matched_subscription_data)
 
@@ -153,7 +151,6 @@ class CycloneReader(_Endpoint):
         self._piece_ref = ctypes.byref(self._piece)
 
     def take(self, maximum: int = _BATCH) -> list[Sample]:
-        """Remove and return up to `maximum` samples, oldest first."""
         samples: list[Sample] = []
         with self._lock:
             while maximum > 0:
@@ -169,11 +166,9 @@ class CycloneReader(_Endpoint):
         return samples
 
     def matched(self) -> int:
-        """Return how many writers match now."""
         return max(0, self._calls.dds_get_matched_publications(self.entity, None, 0))
 
     def writers(self) -> dict[int, bytes]:
-        """Return the guid of every writer that matches now, by its instance handle."""
         calls = self._calls
         return self._peers(calls.dds_get_matched_publications, calls.dds_get_matched_publication_data)
 

@@ -12,6 +12,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from golem.middleware.dds.base import DdsError, NetworkPlace, Payload, Qos, Reader, Sample, Writer, as_sample
 
@@ -116,7 +117,7 @@ def _guid(participant: int, entity: int) -> bytes:
 
 
 class LocalParticipant:
-    """A member of a `LocalDomain`, on no network; its `guid` is 16 bytes, unique on the domain."""
+    """A member of a `LocalDomain`, on no network; see `base.Participant`. Nobody sees `user_data` here."""
 
     network: NetworkPlace | None = None
 
@@ -129,9 +130,7 @@ class LocalParticipant:
         self._open = True
 
     def writer(self, topic: str, type_name: str, qos: Qos, user_data: str = "") -> Writer:
-        """Create a writer; see `base.Participant`. Nobody sees `user_data` here."""
-        self._check(topic, type_name)
-        handle = self._domain.number()
+        handle = self._new(topic, type_name)
         writer = LocalWriter(self._domain, topic, type_name, qos, handle, _guid(self._number, handle))
         self._entities.append(writer)
         return writer
@@ -139,48 +138,60 @@ class LocalParticipant:
     def reader(
         self, topic: str, type_name: str, qos: Qos, user_data: str = "", on_data: Callable[[], None] | None = None
     ) -> Reader:
-        """Create a reader; see `base.Participant`. Nobody sees `user_data` here."""
-        self._check(topic, type_name)
-        handle = self._domain.number()
+        handle = self._new(topic, type_name)
         reader = LocalReader(self._domain, topic, type_name, qos, handle, _guid(self._number, handle), on_data)
         self._entities.append(reader)
         return reader
 
     def close(self) -> None:
-        """Close every writer and reader and leave the domain."""
         self._open = False
         for entity in self._entities:
             entity.close()
         self._entities.clear()
 
-    def _check(self, topic: str, type_name: str) -> None:
+    def _new(self, topic: str, type_name: str) -> int:
+        """Return the handle of a new entity. Raises DdsError: the topic has another type, or this is closed."""
         if not self._open:
             raise DdsError("The participant is closed; create another one.")
         known = self._types.setdefault(topic, type_name)
         if known != type_name:
             raise DdsError(f"Topic '{topic}' already carries '{known}' here; it cannot carry '{type_name}' too.")
+        return self._domain.number()
 
 
-class LocalWriter:
+@dataclass(eq=False)
+class _LocalEndpoint:
+    """What writers and readers have in common; `LocalParticipant` makes them."""
+
+    domain: LocalDomain
+    topic: str
+    type_name: str
+    qos: Qos
+    handle: int
+    guid: bytes
+
+    open = True
+
+    def check(self, kind: str) -> None:
+        if not self.open:
+            raise DdsError(f"The {kind} of '{self.topic}' is closed; create another one.")
+
+
+@dataclass(eq=False)
+class LocalWriter(_LocalEndpoint):
     """A writer of a `LocalParticipant`; see `base.Writer`. It drops nothing."""
 
     dropped = 0
 
-    def __init__(self, domain: LocalDomain, topic: str, type_name: str, qos: Qos, handle: int, guid: bytes) -> None:
-        """Join `domain`; `LocalParticipant.writer` calls it."""
-        self.topic, self.type_name, self.qos = topic, type_name, qos
-        self.handle, self.guid = handle, guid
-        self.history: deque[Sample] = deque(maxlen=qos.depth)
-        self._domain = domain
-        self._open = True
-        domain.add_writer(self)
+    def __post_init__(self) -> None:
+        self.history: deque[Sample] = deque(maxlen=self.qos.depth)
+        self.domain.add_writer(self)
 
     def write(self, payload: Payload) -> None:
         """Deliver a copy of `payload` to every matched reader before returning."""
-        if not self._open:
-            raise DdsError(f"The writer of '{self.topic}' is closed; create another one.")
+        self.check("writer")
         data = as_sample(self.topic, payload)
-        domain = self._domain
+        domain = self.domain
         with domain.lock:
             sample = Sample(data, domain.clock(), self.handle)
             if self.qos.transient_local:
@@ -190,21 +201,19 @@ class LocalWriter:
         domain.call_back()
 
     def matched(self) -> int:
-        """Return how many readers match now."""
         return len(self.readers())
 
     def readers(self) -> dict[int, bytes]:
-        """Return the guid of every reader that matches now, by its instance handle."""
-        return {r.handle: r.guid for r in self._domain.readers(self)} if self._open else {}
+        return {r.handle: r.guid for r in self.domain.readers(self)} if self.open else {}
 
     def close(self) -> None:
-        """Leave the domain."""
-        if self._open:
-            self._open = False
-            self._domain.remove_writer(self)
+        if self.open:
+            self.open = False
+            self.domain.remove_writer(self)
 
 
-class LocalReader:
+@dataclass(eq=False)
+class LocalReader(_LocalEndpoint):
     """A reader of a `LocalParticipant`; see `base.Reader`.
 
     Attributes:
@@ -212,42 +221,25 @@ class LocalReader:
         heard: whether a sample came since the last notice that the writers have gone.
     """
 
-    def __init__(
-        self,
-        domain: LocalDomain,
-        topic: str,
-        type_name: str,
-        qos: Qos,
-        handle: int,
-        guid: bytes,
-        on_data: Callable[[], None] | None,
-    ) -> None:
-        """Join `domain`; `LocalParticipant.reader` calls it."""
-        self.topic, self.type_name, self.qos, self.on_data = topic, type_name, qos, on_data
-        self.handle, self.guid = handle, guid
-        self.queue: deque[Sample] = deque(maxlen=qos.depth)
+    on_data: Callable[[], None] | None
+
+    def __post_init__(self) -> None:
+        self.queue: deque[Sample] = deque(maxlen=self.qos.depth)
         self.heard = False
-        self._domain = domain
-        self._open = True
-        domain.add_reader(self)
+        self.domain.add_reader(self)
 
     def take(self, maximum: int = 64) -> list[Sample]:
-        """Remove and return up to `maximum` samples, oldest first."""
-        if not self._open:
-            raise DdsError(f"The reader of '{self.topic}' is closed; create another one.")
-        with self._domain.lock:
+        self.check("reader")
+        with self.domain.lock:
             return [self.queue.popleft() for _ in range(min(maximum, len(self.queue)))]
 
     def matched(self) -> int:
-        """Return how many writers match now."""
         return len(self.writers())
 
     def writers(self) -> dict[int, bytes]:
-        """Return the guid of every writer that matches now, by its instance handle."""
-        return {w.handle: w.guid for w in self._domain.writers(self)} if self._open else {}
+        return {w.handle: w.guid for w in self.domain.writers(self)} if self.open else {}
 
     def close(self) -> None:
-        """Leave the domain."""
-        if self._open:
-            self._open = False
-            self._domain.remove_reader(self)
+        if self.open:
+            self.open = False
+            self.domain.remove_reader(self)

@@ -240,7 +240,6 @@ class CycloneParticipant:
         atexit.register(self.close)
 
     def writer(self, topic: str, type_name: str, qos: Qos, user_data: str = "") -> CycloneWriter:
-        """Create a writer."""
         with self._lock:
             known = self._topic(topic, type_name)
             with cyclone_qos(self.library, qos, user_data) as handle:
@@ -252,7 +251,6 @@ class CycloneParticipant:
     def reader(
         self, topic: str, type_name: str, qos: Qos, user_data: str = "", on_data: Callable[[], None] | None = None
     ) -> CycloneReader:
-        """Create a reader; `on_data` may be called before this returns."""
         with self._lock:
             known = self._topic(topic, type_name)
             with cyclone_qos(self.library, qos, user_data) as handle:

@@ -284,13 +284,11 @@ class ServiceReader(ServiceEndpoint):
                 self._samples.append(sample)
 
     def take(self, maximum: int = 64) -> list[Sample]:
-        """Remove and return samples, oldest first."""
         with self._lock:
             taken, self._samples = self._samples[:maximum], self._samples[maximum:]
             return taken
 
     def matched(self) -> int:
-        """Return how many writers of requests are there."""
         return self._link.matched(self._topic)
 
     def writers(self) -> dict[int, bytes]:
