@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-from golem.errors import GolemError, MissingExtra
+from golem.errors import GolemError
 from golem.middleware.dds.base import DEFAULT, Payload, Qos
 
 
@@ -62,8 +62,3 @@ class Sink(Protocol):
 
     def close(self) -> None:
         """Complete what was written; calling it again does nothing."""
-
-
-def missing(error: ModuleNotFoundError) -> MissingExtra:
-    """Return the error for a package that the extra `record` brings."""
-    return MissingExtra((error.name or "mcap").partition(".")[0], "record")

@@ -11,20 +11,18 @@ from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import IO, cast
 
-from golem.errors import OutputError
-from golem.middleware.bags.base import BagError, BagMessage, BagTopic, missing
+from golem.errors import OutputError, needs
+from golem.middleware.bags.base import BagError, BagMessage, BagTopic
 from golem.middleware.bags.metadata import Contents, parse_qos
 from golem.middleware.bags.writer import CUSTOM, BagConfig, McapFile, write_metadata
 
-try:
+with needs("", "record"):
     from mcap.exceptions import McapError
     from mcap.reader import SeekingReader
     from mcap.records import Channel, Chunk, McapRecord, Metadata, Schema
     from mcap.records import Message as Record
     from mcap.stream_reader import StreamReader, breakup_chunk
     from zstandard import ZstdError
-except ModuleNotFoundError as error:
-    raise missing(error) from error
 
 MAGIC = b"\x89MCAP0\r\n"
 CDR = "cdr"

@@ -13,15 +13,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Literal
 
-from golem.errors import ConfigError, OutputError
-from golem.middleware.bags.base import BagMessage, BagTopic, missing
+from golem.errors import ConfigError, OutputError, needs
+from golem.middleware.bags.base import BagMessage, BagTopic
 from golem.middleware.bags.metadata import Contents, dump, information, offered_qos
 from golem.middleware.ros.message import NANO
 
-try:
+with needs("", "record"):
     from mcap.writer import CompressionType, Writer
-except ModuleNotFoundError as error:
-    raise missing(error) from error
 
 METADATA = "metadata.yaml"
 CUSTOM = "golem"
