@@ -7,14 +7,14 @@ import weakref
 from collections.abc import Callable
 from typing import Any
 
-from golem.middleware.dds.base import DEFAULT, LATCHED, Sample
+from golem.middleware.dds.base import DEFAULT, LATCHED
 from golem.middleware.ros import codec, goals, names
 from golem.middleware.ros.future import Future, RosError
-from golem.middleware.ros.message import NANO, CodecError
+from golem.middleware.ros.message import NANO
 from golem.middleware.ros.msgs.action_msgs import CancelGoal_Request, GoalStatusArray
 from golem.middleware.ros.node_endpoints import NodeEndpoints
+from golem.middleware.ros.pubsub import Subscription
 from golem.middleware.ros.service import Client
-from golem.middleware.ros.typed import check
 
 
 class ClientGoal:
@@ -53,20 +53,19 @@ class ClientGoal:
 
 
 class ActionClient:
-    """Gives goals to one action; `malformed` counts feedback and statuses that could not be read."""
+    """Gives goals to one action; feedback and statuses that cannot be read are passed over."""
 
     def __init__(self, endpoints: NodeEndpoints, name: str, type: str) -> None:
-        self.name, self.malformed = name, 0
+        self.name = name
         self._type, self._endpoints = codec.action(type), endpoints
         self._goals: weakref.WeakValueDictionary[bytes, ClientGoal] = weakref.WeakValueDictionary()
         parts = names.action(name)
         self._goal = Client(endpoints, parts.send_goal, f"{type}_SendGoal")
         self._cancel = Client(endpoints, parts.cancel_goal, goals.CANCEL_GOAL)
         self._result = Client(endpoints, parts.get_result, f"{type}_GetResult")
-        self._feedback = endpoints.inbox(
-            names.topic(parts.feedback), f"{type}_FeedbackMessage", DEFAULT, self._on_feedback
-        )
-        self._status = endpoints.inbox(names.topic(parts.status), goals.STATUS_ARRAY, LATCHED, self._on_status)
+        feedback = f"{type}_FeedbackMessage"
+        self._feedback = Subscription(endpoints, parts.feedback, feedback, self._on_feedback, DEFAULT)
+        self._status = Subscription(endpoints, parts.status, goals.STATUS_ARRAY, self._on_status, LATCHED)
 
     def ready(self) -> bool:
         """Return whether a server with all its services and topics is there."""
@@ -86,7 +85,7 @@ class ActionClient:
             CodecError: it is not of the action's type.
             RosError: the id is not 16 bytes, or that of a goal in use.
         """
-        check(f"Action '{self.name}'", goal, self._type.Goal)
+        codec.check(f"Action '{self.name}'", goal, self._type.Goal)
         id = uuid.uuid4().bytes if id is None else id
         if len(id) != 16 or id == goals.NO_ID or id in self._goals:
             raise RosError(f"A goal needs an id of its own, 16 bytes and not all zero; {id.hex()} cannot be it.")
@@ -119,24 +118,14 @@ class ActionClient:
         """Stop; what is unanswered fails. Calling it again does nothing."""
         for client in (self._goal, self._cancel, self._result):
             client.close()
-        self._endpoints.close(self._feedback, self._status)
+        self._endpoints.close(self._feedback.inbox, self._status.inbox)
 
-    def _on_feedback(self, sample: Sample) -> None:
-        try:
-            message = codec.deserialize(sample.payload, self._type.FeedbackMessage)
-        except CodecError:
-            self.malformed += 1
-            return
+    def _on_feedback(self, message: Any) -> None:
         goal = self._goals.get(goals.from_uuid(message.goal_id))
         if goal is not None and goal.on_feedback is not None:
             goal.on_feedback(message.feedback)
 
-    def _on_status(self, sample: Sample) -> None:
-        try:
-            message = codec.deserialize(sample.payload, GoalStatusArray)
-        except CodecError:
-            self.malformed += 1
-            return
+    def _on_status(self, message: GoalStatusArray) -> None:
         for entry in message.status_list:
             goal = self._goals.get(goals.from_uuid(entry.goal_info.goal_id))
             if goal is not None:

@@ -21,7 +21,6 @@ from golem.middleware.ros.msgs.action_msgs import CancelGoal_Request, CancelGoal
 from golem.middleware.ros.msgs.action_msgs import GoalStatus as StatusMessage
 from golem.middleware.ros.node_endpoints import NodeEndpoints
 from golem.middleware.ros.service import Origin, Responder
-from golem.middleware.ros.typed import check, serialize
 
 RESULT_TIMEOUT = 10.0
 """How long an action's result is kept after its goal has ended [s]; rcl_action's default (action_server.c)."""
@@ -162,7 +161,7 @@ class ActionServer:
             CodecError: the result is not of the action's type.
         """
         # First, so that a result that cannot be sent does not end the goal.
-        serialize(f"Action '{self.name}'", result, self._type.Result)
+        codec.serialize_as(f"Action '{self.name}'", result, self._type.Result)
         self.update(goal, event)
         response = codec.serialize(self._type.GetResult.Response(int(goal.status), result))
         self._results[goal.id] = response
@@ -172,7 +171,7 @@ class ActionServer:
 
     def send_feedback(self, goal: states.GoalState, feedback: Any) -> None:
         """Publish feedback on `goal`. Raises RosError: the goal has ended; CodecError: it is of another type."""
-        check(f"Action '{self.name}'", feedback, self._type.Feedback)
+        codec.check(f"Action '{self.name}'", feedback, self._type.Feedback)
         if not goal.status.active:
             raise RosError(f"Goal {goal.id.hex()} is {goal.status.name.lower()}: there is no feedback on it any more.")
         self._feedback.write(codec.serialize(self._type.FeedbackMessage(states.to_uuid(goal.id), feedback)))

@@ -271,6 +271,18 @@ def definition(name: str) -> str:
     return codec().definition(name)
 
 
+def check(where: str, message: Any, kind: type[Any]) -> None:
+    """Raise CodecError unless `message` is a `kind`, as `where` prescribes it, e.g. `"Topic '/chatter'"`."""
+    if not isinstance(message, kind):
+        raise CodecError(f"{where} takes a {kind.__msgtype__} here, not {type(message).__name__}.")
+
+
+def serialize_as(where: str, message: Any, kind: type[Any]) -> bytes:
+    """Return the CDR of `message`, a `kind`; see `check`. Raises CodecError: it is none, or not as defined."""
+    check(where, message, kind)
+    return serialize(message)
+
+
 def dds_name(kind: str | type[Message]) -> str:
     """Return what DDS calls a message type: `sensor_msgs::msg::dds_::Image_` for `"sensor_msgs/msg/Image"`."""
     package, sort, name = (kind if isinstance(kind, str) else kind.__msgtype__).split("/")

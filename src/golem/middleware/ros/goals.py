@@ -112,16 +112,6 @@ MAX_REPORTED = 100
 """Ended goals whose status is published, so that the message stays small whatever clients do."""
 
 
-def after(id: bytes, status: GoalStatus, event: GoalEvent) -> GoalStatus:
-    """Return the `status` of the goal with this `id` after `event`. Raises RosError: it cannot happen in this state."""
-    if (status, event) not in TRANSITIONS:
-        valid = ", ".join(e.value for s, e in TRANSITIONS if s is status) or "nothing"
-        raise RosError(
-            f"Goal {id.hex()} is {status.name.lower()}: '{event.value}' cannot happen to it; what can: {valid}."
-        )
-    return TRANSITIONS[status, event]
-
-
 class GoalState:
     """One goal's state: its `id` of 16 bytes is chosen by the client; `stamp` is when it was accepted [ns]."""
 
@@ -137,7 +127,14 @@ class GoalState:
 
     def update(self, event: GoalEvent) -> None:
         """Let `event` happen. Raises RosError: it cannot happen in the present state."""
-        self.status = after(self.id, self.status, event)
+        status = self.status
+        if (status, event) not in TRANSITIONS:
+            valid = ", ".join(e.value for s, e in TRANSITIONS if s is status) or "nothing"
+            raise RosError(
+                f"Goal {self.id.hex()} is {status.name.lower()}: '{event.value}' cannot happen to it; "
+                f"what can: {valid}."
+            )
+        self.status = TRANSITIONS[status, event]
 
 
 class GoalTable:

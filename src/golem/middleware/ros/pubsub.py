@@ -9,7 +9,6 @@ from golem.middleware.dds.base import Qos, Sample
 from golem.middleware.ros import codec, names
 from golem.middleware.ros.message import CodecError
 from golem.middleware.ros.node_endpoints import NodeEndpoints
-from golem.middleware.ros.typed import serialize
 
 
 class Publisher:
@@ -23,7 +22,7 @@ class Publisher:
 
     def publish(self, message: Any) -> None:
         """Send one message. Raises CodecError: it is not of the topic's type."""
-        self.writer.write(serialize(f"Topic '{self.name}'", message, self._kind))
+        self.writer.write(codec.serialize_as(f"Topic '{self.name}'", message, self._kind))
 
     def matched(self) -> int:
         """Return how many subscriptions are known to listen now."""

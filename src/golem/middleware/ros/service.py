@@ -18,7 +18,6 @@ from golem.middleware.ros import codec, names
 from golem.middleware.ros.future import Future, RosError
 from golem.middleware.ros.message import CodecError, Header, pack, unpack
 from golem.middleware.ros.node_endpoints import NodeEndpoints
-from golem.middleware.ros.typed import serialize
 from golem.middleware.rtps.submessages import FAST_DDS
 
 SERVICES = Qos(depth=1000)
@@ -72,7 +71,7 @@ class Client:
         It fails when no server is there or the server goes away; a server that does not answer is the caller's to
         give up on, with `RosNode.wait` or `Future.cancel`.
         """
-        body = serialize(f"Service '{self.name}'", request, self._type.Request)
+        body = codec.serialize_as(f"Service '{self.name}'", request, self._type.Request)
         self._sequence += 1
         number = self._sequence
         future: Future[Any] = Future(lambda: self._forget(number))
@@ -232,7 +231,7 @@ class Service:
     def _answer(self, origin: Origin, request: Any) -> None:
         where = f"Service '{self.responder.name}'"
         try:
-            body = serialize(where, self._callback(request), self._response)
+            body = codec.serialize_as(where, self._callback(request), self._response)
         except Exception as error:  # a user's callback may raise anything
             body = codec.serialize(self._refusal(self._guard.caught(where, error)))
         self.responder.reply(origin, body)
