@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import mujoco
-import numpy as np
 
 from golem.kernels import njit
 from golem.robots.worlds import parts
+from golem.robots.worlds.layout import yaw_quat
+from golem.robots.worlds.parts import ALONG_X, BOX, CAPSULE, CYLINDER
 
 HINGE = "fridge_hinge"
 """Name of the door's joint."""
@@ -20,9 +21,6 @@ INSET = 0.05
 """Distance of the bar from the edge of the door; the hinge is at the other edge [m]."""
 SEAL = 0.02
 """Angle at which the seal has let go [rad]: a gasket of 10 mm at the far edge."""
-_BOX = mujoco.mjtGeom.mjGEOM_BOX
-_CYLINDER = mujoco.mjtGeom.mjGEOM_CYLINDER
-_CAPSULE = mujoco.mjtGeom.mjGEOM_CAPSULE
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,9 +83,8 @@ def seal_torque(most: float, angle: float) -> float:
 def add_fridge(spec: mujoco.MjSpec, layout: FridgeLayout) -> None:
     """Add the cabinet and its door; see `seal_of` for the gasket."""
     side = 1.0 if layout.hinge_left else -1.0  # y of the hinge as seen from the bar
-    turn = layout.yaw
-    quat = [float(np.cos(turn / 2)), 0.0, 0.0, float(np.sin(turn / 2))]
-    body = spec.worldbody.add_body(name="fridge", pos=[layout.front, layout.handle_y, 0.0], quat=quat)
+    place = [layout.front, layout.handle_y, 0.0]
+    body = spec.worldbody.add_body(name="fridge", pos=place, quat=yaw_quat(layout.yaw))
     middle = side * (layout.width / 2 - INSET)
     deep, tall, plinth = 0.56, 1.86, 0.08
     door_low, door_high = 0.62, tall - 0.02
@@ -102,19 +99,16 @@ def add_fridge(spec: mujoco.MjSpec, layout: FridgeLayout) -> None:
         ("back", (0.02, half_w, tall / 2), (face + deep - 0.02, middle, tall / 2 + plinth)),
         ("plinth", (deep / 2 - 0.03, half_w - 0.02, plinth / 2), (face + deep / 2, middle, plinth / 2)),
     ):
-        parts.collider(body, _BOX, size, pos)
-        parts.visual(body, _BOX, size, pos, material="dark" if name == "plinth" else shell)
+        parts.solid(body, BOX, size, pos, "dark" if name == "plinth" else shell)
     for z in (0.78, 1.02, 1.28, 1.54):
-        parts.visual(body, _BOX, (deep / 2 - 0.03, half_w - 0.04, 0.006), (face + deep / 2, middle, z),
-                     material="fridge_glass")  # fmt: skip
+        parts.visual(body, BOX, (deep / 2 - 0.03, half_w - 0.04, 0.006), (face + deep / 2, middle, z), "fridge_glass")
     # The freezer drawer below stays shut.
     drawer = (door_low - 0.01 - plinth) / 2
     size, pos = (thick / 2, half_w - 0.002, drawer), (thick / 2, middle, plinth + drawer)
-    parts.collider(body, _BOX, size, pos)
-    parts.visual(body, _BOX, size, pos, material=shell)
-    parts.visual(body, _BOX, (0.012, half_w - 0.08, 0.012), (-0.035, middle, 2 * drawer), material="steel")
+    parts.solid(body, BOX, size, pos, shell)
+    parts.visual(body, BOX, (0.012, half_w - 0.08, 0.012), (-0.035, middle, 2 * drawer), "steel")
     for y in (-half_w + 0.09, half_w - 0.09):
-        parts.visual(body, _BOX, (0.02, 0.01, 0.01), (-0.015, middle + y, 2 * drawer), material="steel")
+        parts.visual(body, BOX, (0.02, 0.01, 0.01), (-0.015, middle + y, 2 * drawer), "steel")
     _add_door(body, layout, side, middle, (door_low, door_high), thick)
 
 
@@ -131,21 +125,19 @@ def _add_door(
     half_h, half_w = (high - low) / 2, layout.width / 2
     y = middle - side * layout.arm
     size, pos = (thick / 2, half_w - 0.002, half_h), (-thick / 2, y, low + half_h)
-    parts.collider(door, _BOX, size, pos, mass=layout.mass)
-    parts.visual(door, _BOX, size, pos, material="fridge_steel")
-    parts.visual(door, _BOX, (0.004, half_w - 0.015, half_h - 0.015), (0.003, y, low + half_h), material="rubber")
+    parts.solid(door, BOX, size, pos, "fridge_steel", mass=layout.mass)
+    parts.visual(door, BOX, (0.004, half_w - 0.015, half_h - 0.015), (0.003, y, low + half_h), "rubber")
     at_y = -side * layout.arm
     x, z = -thick - layout.standoff, layout.handle_z
     bar = (layout.radius, layout.length / 2)
-    parts.collider(door, _CYLINDER, bar, (x, at_y, z), friction=0.8, mass=0.3)
-    parts.visual(door, _CAPSULE, bar, (x, at_y, z), material="fridge_bar", name=HANDLE)
+    parts.collider(door, CYLINDER, bar, (x, at_y, z), friction=0.8, mass=0.3)
+    parts.visual(door, CAPSULE, bar, (x, at_y, z), "fridge_bar", name=HANDLE)
     for k, end in enumerate((-1.0, 1.0)):
         post = (0.009, layout.standoff / 2)
         at = (-thick - layout.standoff / 2, at_y, z + end * (layout.length / 2 - 0.02))
-        lying = (0.70710678, 0.0, 0.70710678, 0.0)
-        parts.collider(door, _CYLINDER, post, at, quat=lying)
-        parts.visual(door, _CYLINDER, post, at, quat=lying, material="fridge_bar", name=f"{HANDLE}_post_{k}")
-    parts.visual(door, _BOX, (0.001, 0.035, 0.012), (-thick - 0.0005, y, high - 0.10), material="steel")
+        parts.collider(door, CYLINDER, post, at, quat=ALONG_X)
+        parts.visual(door, CYLINDER, post, at, "fridge_bar", quat=ALONG_X, name=f"{HANDLE}_post_{k}")
+    parts.visual(door, BOX, (0.001, 0.035, 0.012), (-thick - 0.0005, y, high - 0.10), "steel")
 
 
 def seal_of(model: mujoco.MjModel, layout: FridgeLayout) -> Seal:

@@ -13,6 +13,8 @@ import mujoco
 import numpy as np
 
 from golem.robots.worlds import hall, parts
+from golem.robots.worlds.layout import yaw_quat
+from golem.robots.worlds.parts import BOX, CAPSULE, CYLINDER, SPHERE
 from golem.types import Array
 
 AREA = (1.8, 4.3, -2.4, 2.6)
@@ -110,10 +112,6 @@ PERSON = (0.20, 1.75)
 SPEED = (0.6, 1.3)
 """Range of a person's walking speed [m/s]."""
 
-_BOX = mujoco.mjtGeom.mjGEOM_BOX
-_CYLINDER = mujoco.mjtGeom.mjGEOM_CYLINDER
-_CAPSULE = mujoco.mjtGeom.mjGEOM_CAPSULE
-_SPHERE = mujoco.mjtGeom.mjGEOM_SPHERE
 _WALL = 0.1
 
 
@@ -161,11 +159,11 @@ def add_furnished_hall(spec: mujoco.MjSpec, rng: np.random.Generator, *, bare: b
         if rng.random() < 0.5:
             _solid(body, (0.2, 0.2, HEIGHT / 2), (x, y, HEIGHT / 2))
         else:
-            _solid(body, (0.18, HEIGHT / 2), (x, y, HEIGHT / 2), kind=_CYLINDER)
+            _solid(body, (0.18, HEIGHT / 2), (x, y, HEIGHT / 2), kind=CYLINDER)
     for x, y in _along_lane(rng, int(rng.integers(3, 8)), (back, front, right, left)):
         size = rng.uniform((0.2, 0.2, 0.2), (0.5, 0.5, 0.7))
         turn = rng.uniform(0.0, np.pi)
-        _solid(body, tuple(size), (x, y, size[2]), quat=(np.cos(turn / 2), 0.0, 0.0, np.sin(turn / 2)))
+        _solid(body, tuple(size), (x, y, size[2]), quat=yaw_quat(turn))
     ahead = float(rng.uniform(7.9, 8.6)), float(rng.uniform(-0.3, 0.3))
     if not bare:
         _pack(body, ahead)
@@ -191,10 +189,10 @@ def add_people(spec: mujoco.MjSpec, rng: np.random.Generator, count: int) -> tup
         name = f"person_{i}"
         body = spec.worldbody.add_body(name=name, mocap=True)
         trunk = height - 0.25 - radius
-        _solid(body, (radius, (trunk - 0.7) / 2), (0.0, 0.0, (trunk + 0.7) / 2), kind=_CAPSULE)
+        _solid(body, (radius, (trunk - 0.7) / 2), (0.0, 0.0, (trunk + 0.7) / 2), kind=CAPSULE)
         for side in (-1, 1):
-            _solid(body, (0.08, 0.35), (0.0, side * 0.1, 0.43), kind=_CAPSULE)
-        _solid(body, (0.11,), (0.0, 0.0, height - 0.11), kind=_SPHERE)
+            _solid(body, (0.08, 0.35), (0.0, side * 0.1, 0.43), kind=CAPSULE)
+        _solid(body, (0.11,), (0.0, 0.0, height - 0.11), kind=SPHERE)
         y = rng.uniform(-2.6, -1.5, size=2) if i % 2 == 0 else rng.uniform(3.6, 3.9, size=2)
         x = np.array([rng.uniform(-0.5, 1.5), rng.uniform(4.0, 7.0)])
         people.append(Person(name, np.column_stack([x, y]), rng.uniform(*SPEED), rng.random()))
@@ -207,8 +205,7 @@ def add_course(spec: mujoco.MjSpec, rng: np.random.Generator, count: int) -> Non
     for one in draw_course(rng, count):
         size = (float(one.size[0]), float(one.size[2])) if one.round else tuple(one.size.tolist())
         at = (float(one.place[0]), float(one.place[1]), float(one.size[2]))
-        turn = (float(np.cos(one.yaw / 2)), 0.0, 0.0, float(np.sin(one.yaw / 2)))
-        _solid(body, size, at, kind=_CYLINDER if one.round else _BOX, quat=turn)
+        _solid(body, size, at, kind=CYLINDER if one.round else BOX, quat=yaw_quat(one.yaw))
 
 
 def _ground(spec: mujoco.MjSpec, half: float, *, lit: bool = True) -> None:
@@ -289,8 +286,8 @@ def _solid(
     size: tuple[float, ...],
     pos: tuple[float, float, float],
     *,
-    kind: mujoco.mjtGeom = _BOX,
-    quat: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0),
+    kind: mujoco.mjtGeom = BOX,
+    quat: Sequence[float] = (1.0, 0.0, 0.0, 0.0),
 ) -> mujoco.MjsGeom:
     geom = parts.collider(body, kind, size, pos, quat=quat)
     geom.rgba = [0.66, 0.67, 0.70, 1.0]

@@ -10,6 +10,7 @@ from golem.robots.model.spatial import rotation_rpy
 from golem.robots.worlds import parts
 from golem.robots.worlds.conditions import COATS, TRAYS, Conditions, Finish
 from golem.robots.worlds.layout import yaw_quat
+from golem.robots.worlds.parts import BOX
 from golem.types import PlanarPose
 
 MATERIALS: dict[str, tuple[list[float], float, float, float]] = load_data(__package__, "worlds.yaml")["materials"]
@@ -19,8 +20,6 @@ FLOOR_FRICTION = 1.0
 """Sliding friction of the floor."""
 
 HERE = PlanarPose(0.0, 0.0, 0.0)
-
-_BOX = mujoco.mjtGeom.mjGEOM_BOX
 
 
 def add_materials(spec: mujoco.MjSpec) -> None:
@@ -60,16 +59,22 @@ def add_hall(spec: mujoco.MjSpec, half: float = 6.0, *, marks: bool = True, stan
     )  # fmt: skip
     hall = world.add_body(name="hall", pos=[stance.x, stance.y, 0.0], quat=yaw_quat(stance.yaw))
     for side in (-1, 1) if marks else ():
-        parts.visual(hall, _BOX, (0.05, 2.6, 0.002), (0.95, side * 1.9, 0.001),
-                     material="warning_yellow", quat=(0.70710678, 0, 0, 0.70710678))  # fmt: skip
+        parts.visual(
+            hall,
+            BOX,
+            (0.05, 2.6, 0.002),
+            (0.95, side * 1.9, 0.001),
+            "warning_yellow",
+            quat=(0.70710678, 0, 0, 0.70710678),
+        )
     for side in (-1, 1):
-        parts.visual(hall, _BOX, (0.05, half, 2.0), (side * half, 0, 2.0), material="wall_paint")
-        parts.visual(hall, _BOX, (0.06, half, 0.45), (side * (half - 0.02), 0, 0.45), material="wall_band")
+        parts.visual(hall, BOX, (0.05, half, 2.0), (side * half, 0, 2.0), "wall_paint")
+        parts.visual(hall, BOX, (0.06, half, 0.45), (side * (half - 0.02), 0, 0.45), "wall_band")
     for side in (-1, 1):
-        parts.visual(hall, _BOX, (half, 0.05, 2.0), (0, side * half, 2.0), material="wall_paint")
-        parts.visual(hall, _BOX, (half, 0.06, 0.45), (0, side * (half - 0.02), 0.45), material="wall_band")
+        parts.visual(hall, BOX, (half, 0.05, 2.0), (0, side * half, 2.0), "wall_paint")
+        parts.visual(hall, BOX, (half, 0.06, 0.45), (0, side * (half - 0.02), 0.45), "wall_band")
     for y in (-4, -2, 0, 2, 4):
-        parts.visual(hall, _BOX, (0.08, 0.08, 2.0), (half - 0.1, y, 2.0), material="aluminium")
+        parts.visual(hall, BOX, (0.08, 0.08, 2.0), (half - 0.1, y, 2.0), "aluminium")
     add_lamps(spec, stance)
 
 

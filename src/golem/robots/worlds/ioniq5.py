@@ -12,27 +12,14 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
+from golem.package_data import load_data
 from golem.robots.worlds.layout import KINDS, Kind, PackLayout, TrayPlace
 from golem.robots.worlds.pack_part import COVER, Rectangle, add_hole, add_legs, add_slab, square, without
 from golem.types import Array, PlanarPose
 
 RIM = 0.857
 """Height of the rim over the floor on which the robot stands, at the condition `height` 0 [m]."""
-_TRAYS: tuple[tuple[str, Kind, tuple[float, float, float]], ...] = (
-    ("tray", "screw", (0.145, -0.28, 0.0)),
-    ("tray_nuts", "nut", (0.145, -0.55, 0.0)),
-    ("tray_near_left", "screw", (0.145, 0.35, 0.0)),
-    ("tray_near_left_nuts", "nut", (0.145, 0.6, 0.0)),
-    ("tray_left", "screw", (0.27, 0.86, np.pi / 2)),
-    ("tray_left_nuts", "nut", (0.56, 0.81, np.pi / 2)),
-    ("tray_left_far", "screw", (0.85, 0.88, np.pi / 2)),
-    ("tray_far", "screw", (1.092, 0.28, np.pi)),
-    ("tray_far_nuts", "nut", (1.092, 0.55, np.pi)),
-    ("tray_far_right", "screw", (1.092, -0.35, np.pi)),
-    ("tray_far_right_nuts", "nut", (1.092, -0.6, np.pi)),
-    ("tray_right", "screw", (0.45, -0.90, -np.pi / 2)),
-    ("tray_right_nuts", "nut", (0.72, -0.90, -np.pi / 2)),
-)
+_TRAYS: list[tuple[str, Kind, tuple[float, float, float]]] = load_data(__package__, "worlds.yaml")["ioniq5_trays"]
 """Name, kind, and x, y, yaw in the pack frame of trays: both kinds are within reach all round [m, rad]."""
 FRAME = (0.03, 1.20)
 """x at which the widest rectangle is cut in three, so that holes of the long edges split nothing but these [m]."""

@@ -11,31 +11,23 @@ from dataclasses import dataclass, replace
 import mujoco
 import numpy as np
 
+from golem.package_data import load_data
 from golem.robots.worlds import hall, parts
 from golem.robots.worlds.fridge import HANDLE, FridgeLayout, add_fridge
 from golem.robots.worlds.pack import PackPart
+from golem.robots.worlds.parts import ALONG_X, BOX, CYLINDER
 from golem.robots.worlds.tableware import COLOURS, KINDS, add_object
 
-FRONTS: tuple[tuple[float, float, float], ...] = (
-    (0.93, 0.92, 0.89), (0.36, 0.45, 0.41), (0.20, 0.28, 0.38), (0.62, 0.46, 0.31), (0.80, 0.82, 0.84),
-)  # fmt: skip
-"""Colours of the cabinets' fronts (r, g, b)."""
-TOPS: tuple[tuple[float, float, float], ...] = (
-    (0.30, 0.30, 0.32), (0.78, 0.75, 0.70), (0.55, 0.40, 0.26), (0.88, 0.88, 0.87),
-)  # fmt: skip
-"""Colours of the counter's top."""
-STEELS: tuple[tuple[float, float, float], ...] = (
-    (0.72, 0.73, 0.75), (0.90, 0.90, 0.90), (0.18, 0.18, 0.20), (0.62, 0.20, 0.18), (0.70, 0.84, 0.80),
-)  # fmt: skip
-"""Colours of the fridge."""
+FRONTS, TOPS, STEELS = (
+    [tuple(colour) for colour in row] for row in load_data(__package__, "worlds.yaml")["kitchen"].values()
+)
+"""Colours of the cabinets' fronts, of the counter's top and of the fridge (r, g, b)."""
 APART = 0.04
 """Least distance between two things on the counter [m]."""
 LEAST_APART = 0.10
 """The same of things before the robot [m]: an open finger comes between them."""
 GRIP = 20.0
 """How much stiffer friction is than contact (MuJoCo's `impratio`): at 1 a can creeps out of a hand in seconds."""
-_BOX = mujoco.mjtGeom.mjGEOM_BOX
-_CYLINDER = mujoco.mjtGeom.mjGEOM_CYLINDER
 
 
 @dataclass(frozen=True, slots=True)
@@ -258,8 +250,7 @@ def _add_room(spec: mujoco.MjSpec, at: tuple[float, float]) -> None:
     )  # fmt: skip
     for size, x, y in (((0.05, 4.0, 1.35), 1.40, 0.0), ((3.0, 0.05, 1.35), -1.6, 3.2), ((3.0, 0.05, 1.35), -1.6, -3.2)):
         pos, material = (x + at[0], y + at[1], 1.35), "wall_paint"
-        parts.collider(world, _BOX, size, pos)
-        parts.visual(world, _BOX, size, pos, material=material)
+        parts.solid(world, BOX, size, pos, material)
     for x, y, level in ((0.1, 0.7, 0.40), (0.1, -0.9, 0.36), (-1.2, 0.0, 0.28)):
         world.add_light(
             pos=[x + at[0], y + at[1], 2.6], dir=[0.45, -0.3 * y, -1.0], diffuse=[level] * 3,
@@ -276,37 +267,32 @@ def _add_counter(body: mujoco.MjsBody, layout: KitchenLayout, sign: float) -> No
     y, half = sign * (near + far) / 2, (far - near) / 2
     x, deep = (front + back) / 2, (back - front) / 2
     slab = 0.02
-    parts.collider(body, _BOX, (deep, half, slab), (x, y, top - slab), friction=0.7)
-    parts.visual(body, _BOX, (deep, half, slab), (x, y, top - slab), material="counter_top")
+    parts.solid(body, BOX, (deep, half, slab), (x, y, top - slab), "counter_top", friction=0.7)
     low = (top - 2 * slab - 0.10) / 2
     size, pos = (deep - 0.015, half - 0.005, low), (x + 0.015, y, 0.10 + low)
-    parts.collider(body, _BOX, size, pos)
-    parts.visual(body, _BOX, size, pos, material="cabinet")
-    parts.visual(body, _BOX, (deep - 0.05, half, 0.05), (x + 0.05, y, 0.05), material="dark")
-    parts.visual(body, _BOX, (0.012, half, 0.32), (back, y, top + 0.32), material="tiles")
+    parts.solid(body, BOX, size, pos, "cabinet")
+    parts.visual(body, BOX, (deep - 0.05, half, 0.05), (x + 0.05, y, 0.05), "dark")
+    parts.visual(body, BOX, (0.012, half, 0.32), (back, y, top + 0.32), "tiles")
     width = 2 * half / 4
     for k in range(4):
         middle = sign * (near + (k + 0.5) * width)
         _front(body, (front + 0.012, middle, 0.10 + low), (width / 2 - 0.006, low - 0.008), sign)
         _front(body, (back - 0.36, middle, top + 0.98), (width / 2 - 0.006, 0.34), sign)
     upper = (0.175, half, 0.35)
-    parts.collider(body, _BOX, upper, (back - 0.175, y, top + 0.98))
-    parts.visual(body, _BOX, upper, (back - 0.175, y, top + 0.98), material="cabinet")
+    parts.solid(body, BOX, upper, (back - 0.175, y, top + 0.98), "cabinet")
     # A sink with a tap, well away from where things stand.
     at = sign * 1.75
-    parts.visual(body, _BOX, (0.20, 0.26, 0.002), (x, at, top + 0.001), material="sink")
-    parts.visual(body, _BOX, (0.17, 0.23, 0.002), (x, at, top + 0.002), material="dark")
-    parts.visual(body, _CYLINDER, (0.014, 0.13), (x + 0.24, at, top + 0.13), material="sink")
-    parts.visual(body, _CYLINDER, (0.011, 0.09), (x + 0.16, at, top + 0.255), material="sink",
-                 quat=(0.70710678, 0.0, 0.70710678, 0.0))  # fmt: skip
+    parts.visual(body, BOX, (0.20, 0.26, 0.002), (x, at, top + 0.001), "sink")
+    parts.visual(body, BOX, (0.17, 0.23, 0.002), (x, at, top + 0.002), "dark")
+    parts.visual(body, CYLINDER, (0.014, 0.13), (x + 0.24, at, top + 0.13), "sink")
+    parts.visual(body, CYLINDER, (0.011, 0.09), (x + 0.16, at, top + 0.255), "sink", quat=ALONG_X)
 
 
 def _front(body: mujoco.MjsBody, at: tuple[float, float, float], size: tuple[float, float], sign: float) -> None:
     """Add a cabinet's front with a frame and a knob, facing the robot."""
     x, y, z = at
     half_w, half_h = size
-    parts.visual(body, _BOX, (0.010, half_w, half_h), (x, y, z), material="cabinet")
-    parts.visual(body, _BOX, (0.002, half_w - 0.05, half_h - 0.05), (x - 0.0105, y, z), material="cabinet")
+    parts.visual(body, BOX, (0.010, half_w, half_h), (x, y, z), "cabinet")
+    parts.visual(body, BOX, (0.002, half_w - 0.05, half_h - 0.05), (x - 0.0105, y, z), "cabinet")
     knob = (x - 0.022, y - sign * (half_w - 0.04), z + (0.7 * half_h if z < 1.0 else -0.7 * half_h))
-    parts.visual(body, _CYLINDER, (0.010, 0.012), knob, material="steel",
-                 quat=(0.70710678, 0.0, 0.70710678, 0.0))  # fmt: skip
+    parts.visual(body, CYLINDER, (0.010, 0.012), knob, "steel", quat=ALONG_X)

@@ -17,13 +17,13 @@ from golem.robots.worlds import hall, pack_part, parts, screws
 from golem.robots.worlds.ioniq5 import Ioniq5Layout, add_cover
 from golem.robots.worlds.layout import PackLayout, TrayPlace, yaw_quat
 from golem.robots.worlds.pack_part import COVER, PackPart, Span, add_hole, add_legs, add_slab, square, without
+from golem.robots.worlds.parts import BOX, CYLINDER
 from golem.robots.worlds.screws import ScrewDraw
 from golem.types import Array, PlanarPose
 
 WALL, DEEP = 0.003, 0.010
 """Thickness of a tray's walls and floor, and how far the floor's collider goes on below it [m]: a nut of 2 g that is
 let go 10 cm above falls by as much as the floor in a tick, and would come through."""
-_BOX = mujoco.mjtGeom.mjGEOM_BOX
 
 
 def add_tray(spec: mujoco.MjSpec, layout: PackLayout, place: TrayPlace) -> None:
@@ -41,8 +41,8 @@ def add_tray(spec: mujoco.MjSpec, layout: PackLayout, place: TrayPlace) -> None:
     ]
     for k, (size, pos) in enumerate(walls):
         (a, b, c), (x, y, z), deep = size, pos, 0.0 if k else 0.5 * DEEP
-        parts.collider(body, _BOX, (a, b, c + deep), (x, y, z - deep), friction=0.8)
-        parts.visual(body, _BOX, size, pos, material=paint, name=f"{place.name}_part_{k}")
+        parts.collider(body, BOX, (a, b, c + deep), (x, y, z - deep), friction=0.8)
+        parts.visual(body, BOX, size, pos, paint, name=f"{place.name}_part_{k}")
     rim = 0.006
     for k, (size, pos) in enumerate(
         [
@@ -52,17 +52,17 @@ def add_tray(spec: mujoco.MjSpec, layout: PackLayout, place: TrayPlace) -> None:
             ((hx + rim / 2, rim / 2, 0.0015), (0.0, -hy, sz)),
         ]
     ):
-        parts.visual(body, _BOX, size, pos, material=paint, name=f"{place.name}_rim_{k}")
+        parts.visual(body, BOX, size, pos, paint, name=f"{place.name}_rim_{k}")
     x, y, _, _ = np.linalg.inv(layout.pose()) @ (place.x, place.y, place.z, 1.0)
     over_cover = 0.0 < x < layout.size_x and abs(y) < layout.size_y / 2
     foot = layout.top_z if over_cover else 0.0
     if place.z - foot > 0.005:
         post = (place.z - foot) / 2
         radius = 0.03
-        parts.visual(body, mujoco.mjtGeom.mjGEOM_CYLINDER, (radius, post), (0, 0, -post), material="stand_blue")
-        parts.collider(body, mujoco.mjtGeom.mjGEOM_CYLINDER, (radius, post), (0, 0, -post))
+        parts.visual(body, CYLINDER, (radius, post), (0, 0, -post), "stand_blue")
+        parts.collider(body, CYLINDER, (radius, post), (0, 0, -post))
         if not over_cover:
-            parts.visual(body, _BOX, (hx, hy, 0.01), (0, 0, -2 * post + 0.01), material="stand_blue")
+            parts.visual(body, BOX, (hx, hy, 0.01), (0, 0, -2 * post + 0.01), "stand_blue")
 
 
 STUD_PITCH = 0.09
@@ -70,8 +70,6 @@ FASTENER_HEAD = (0.0105, 0.006)
 """Across flats and height of the heads that are still tight [m]."""
 TIGHT = ((0.009, 0.005, 0.0), (0.0125, 0.007, 0.0016))
 """The same and what lies below, least and most [m]: up to an M6 washer, 1.6 mm (ISO 7089); heads are assumed."""
-
-_CYLINDER = mujoco.mjtGeom.mjGEOM_CYLINDER
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,19 +167,19 @@ def _add_stand(body: mujoco.MjsBody, layout: PackLayout) -> None:
     top = layout.window_depth + 0.025
     below = (layout.thickness - top) / 2
     mid = -top - below
-    parts.collider(body, _BOX, (hx, hy, below), (cx, 0, mid))
-    parts.visual(body, _BOX, (hx - 0.03, hy - 0.03, below), (cx, 0, mid), material="aluminium")
+    parts.collider(body, BOX, (hx, hy, below), (cx, 0, mid))
+    parts.visual(body, BOX, (hx - 0.03, hy - 0.03, below), (cx, 0, mid), "aluminium")
     for side in (-1, 1):
         flange = (top - COVER) / 2
         for size, pos in (
             ((0.03, hy, flange), (cx + side * (hx - 0.03), 0, -COVER - flange)),
             ((hx - 0.06, 0.03, flange), (cx, side * (hy - 0.03), -COVER - flange)),
         ):
-            parts.visual(body, _BOX, size, pos, material="aluminium")
-            parts.collider(body, _BOX, size, pos)
+            parts.visual(body, BOX, size, pos, "aluminium")
+            parts.collider(body, BOX, size, pos)
     for y in np.linspace(-hy + 0.12, hy - 0.12, 6):
         for x in (0.008, layout.size_x - 0.008):
-            parts.visual(body, _BOX, (0.02, 0.03, 0.02), (x, y, -layout.thickness + 0.03), material="aluminium")
+            parts.visual(body, BOX, (0.02, 0.03, 0.02), (x, y, -layout.thickness + 0.03), "aluminium")
     add_legs(body, layout)
 
 
@@ -217,14 +215,12 @@ def _add_rim(spec: mujoco.MjSpec, body: mujoco.MjsBody, layout: PackLayout, hole
                 continue
             if xs[0] < wx1 and layout.tray_z < layout.top_z + 0.01 and abs(y - layout.tray_xy[1]) < 0.2:
                 continue
-            parts.visual(body, _BOX, ((xs[1] - xs[0]) / 2, 0.035, 0.001), ((xs[0] + xs[1]) / 2, y, 0.0005),
-                         material="cover_bead")  # fmt: skip
-    parts.visual(body, _BOX, (0.045, 0.07, 0.0005), (0.085, 0.55, 0.0004), material="warning_yellow")
-    parts.visual(body, _BOX, (0.030, 0.06, 0.0005), (0.085, 0.73, 0.0004), material="label_white")
-    parts.visual(body, _BOX, (0.020, 0.002, 0.0006), (0.085, 0.535, 0.0006), material="dark")
+            parts.visual(body, BOX, ((xs[1] - xs[0]) / 2, 0.035, 0.001), ((xs[0] + xs[1]) / 2, y, 0.0005), "cover_bead")
+    parts.visual(body, BOX, (0.045, 0.07, 0.0005), (0.085, 0.55, 0.0004), "warning_yellow")
+    parts.visual(body, BOX, (0.030, 0.06, 0.0005), (0.085, 0.73, 0.0004), "label_white")
+    parts.visual(body, BOX, (0.020, 0.002, 0.0006), (0.085, 0.535, 0.0006), "dark")
     for k in range(4):
-        parts.visual(body, _BOX, (0.002, 0.045 - 0.006 * (k % 2), 0.0006), (0.07 + 0.01 * k, 0.73, 0.0006),
-                     material="dark")  # fmt: skip
+        parts.visual(body, BOX, (0.002, 0.045 - 0.006 * (k % 2), 0.0006), (0.07 + 0.01 * k, 0.73, 0.0006), "dark")
 
 
 def _strip(body: mujoco.MjsBody, xs: Span, ys: Span, holes: Sequence[tuple[float, float]], *, along: int) -> None:
@@ -242,8 +238,8 @@ def _add_window(body: mujoco.MjsBody, layout: PackLayout) -> list[PackPart]:
     (x0, x1), (y0, y1), depth = layout.window_x, layout.window_y, layout.window_depth
     floor = -depth
     cx, cy, hx, hy = (x0 + x1) / 2, (y0 + y1) / 2, (x1 - x0) / 2, (y1 - y0) / 2
-    parts.collider(body, _BOX, (hx, hy, 0.01), (cx, cy, floor - 0.01))
-    parts.visual(body, _BOX, (hx, hy, 0.01), (cx, cy, floor - 0.012), material="dark")
+    parts.collider(body, BOX, (hx, hy, 0.01), (cx, cy, floor - 0.01))
+    parts.visual(body, BOX, (hx, hy, 0.01), (cx, cy, floor - 0.012), "dark")
     lip = 0.004
     for size, pos in (
         ((hx + lip, lip / 2, 0.001), (cx, y0 - lip / 2, 0.0005)),
@@ -251,7 +247,7 @@ def _add_window(body: mujoco.MjsBody, layout: PackLayout) -> list[PackPart]:
         ((lip / 2, hy, 0.001), (x0 - lip / 2, cy, 0.0005)),
         ((lip / 2, hy, 0.001), (x1 + lip / 2, cy, 0.0005)),
     ):
-        parts.visual(body, _BOX, size, pos, material="steel")
+        parts.visual(body, BOX, size, pos, "steel")
     columns = int((y1 - y0 - 0.02) // (2 * STUD_PITCH))
     pitch = 2 * STUD_PITCH
     start = cy - pitch * columns / 2
@@ -260,14 +256,13 @@ def _add_window(body: mujoco.MjsBody, layout: PackLayout) -> list[PackPart]:
         mx = x0 + (0.27 + 0.46 * row) * (x1 - x0)
         for col in range(columns):
             my = start + pitch * (col + 0.5)
-            parts.visual(body, _BOX, (0.095, pitch / 2 - 0.006, 0.009), (mx, my, floor + 0.001),
-                         material="module_black")  # fmt: skip
+            parts.visual(body, BOX, (0.095, pitch / 2 - 0.006, 0.009), (mx, my, floor + 0.001), "module_black")
             for end in (-1, 1):
-                parts.visual(body, _BOX, (0.012, pitch / 2 - 0.012, 0.004), (mx + end * 0.078, my, floor + 0.012),
-                             material="module_cap")  # fmt: skip
+                parts.visual(
+                    body, BOX, (0.012, pitch / 2 - 0.012, 0.004), (mx + end * 0.078, my, floor + 0.012), "module_cap"
+                )
             for rib in (-0.03, 0.0, 0.03):
-                parts.visual(body, _BOX, (0.004, pitch / 2 - 0.02, 0.001), (mx + rib, my, floor + 0.0105),
-                             material="module_cap")  # fmt: skip
+                parts.visual(body, BOX, (0.004, pitch / 2 - 0.02, 0.001), (mx + rib, my, floor + 0.0105), "module_cap")
     top = floor + 0.014
     for row in range(2):
         for col in range(columns - 1):
@@ -290,9 +285,9 @@ def _add_bus_bar(body: mujoco.MjsBody, pos: tuple[float, float, float], name: st
     thick = 0.0015
     bar = (0.011, half, thick) if along else (half, 0.011, thick)
     sleeve = (0.013, half - 0.034, 0.0045) if along else (half - 0.034, 0.013, 0.0045)
-    parts.visual(body, _BOX, bar, (x, y, z), material="copper", name=f"{name}_bar")
-    parts.visual(body, _BOX, sleeve, (x, y, z + 0.001), material="hv_orange", name=f"{name}_sleeve")
-    parts.collider(body, _BOX, bar, (x, y, z))
+    parts.visual(body, BOX, bar, (x, y, z), "copper", name=f"{name}_bar")
+    parts.visual(body, BOX, sleeve, (x, y, z + 0.001), "hv_orange", name=f"{name}_sleeve")
+    parts.collider(body, BOX, bar, (x, y, z))
     extent = np.array([2 * bar[0], 2 * bar[1], 2 * sleeve[2]])
     centre = np.array([x, y, z + 0.0055])
     found = [PackPart("bus_bar", "pack", (f"{name}_bar", f"{name}_sleeve"), centre, extent)]
@@ -330,11 +325,11 @@ def _add_fasteners(
             if tight is not None:
                 flats, height, low = tight.uniform(*TIGHT)
                 head = parts.add_mesh(spec, names[1], *parts.hexagon(flats, height))
-                parts.visual(body, _CYLINDER, (0.0072, low / 2), (x, y, z + low / 2), material="steel")
+                parts.visual(body, CYLINDER, (0.0072, low / 2), (x, y, z + low / 2), "steel")
             top = low + height
             parts.visual_mesh(body, flange, (x, y, z + low), material="zinc", name=names[0])
             parts.visual_mesh(body, head, (x, y, z + low), material="zinc", name=names[1])
-            parts.collider(body, _CYLINDER, (0.006 * flats / FASTENER_HEAD[0], top / 2), (x, y, z + top / 2))
+            parts.collider(body, CYLINDER, (0.006 * flats / FASTENER_HEAD[0], top / 2), (x, y, z + top / 2))
             size = np.array([0.0144, 0.0144, top])
             found.append(PackPart("screw", "pack", names, at + [0, 0, top], size))
     return found

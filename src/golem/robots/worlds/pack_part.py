@@ -10,12 +10,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import mujoco
 import numpy as np
 
+from golem.package_data import load_data
 from golem.robots.worlds import parts
 from golem.robots.worlds.layout import HOLE_CELL, PackLayout, yaw_quat
+from golem.robots.worlds.parts import ALONG_Y, BOX, CAPSULE, CYLINDER
 from golem.robots.worlds.screws import SOLREF, ScrewDraw, loosened
 from golem.types import Array
 
@@ -75,8 +78,7 @@ def add_slab(
     """Add one piece of a pack, seen and colliding, from its extent in x and y, the height of its top, and below."""
     size = ((xs[1] - xs[0]) / 2, (ys[1] - ys[0]) / 2, thick / 2)
     pos = ((xs[0] + xs[1]) / 2, (ys[0] + ys[1]) / 2, top - thick / 2)
-    parts.collider(body, _BOX, size, pos)
-    parts.visual(body, _BOX, size, pos, material=material)
+    parts.solid(body, BOX, size, pos, material)
 
 
 def add_hole(spec: mujoco.MjSpec, body: mujoco.MjsBody, name: str, at: Array, radius: float, *, closed: bool) -> None:
@@ -85,32 +87,29 @@ def add_hole(spec: mujoco.MjSpec, body: mujoco.MjsBody, name: str, at: Array, ra
     plate = parts.add_mesh(spec, f"hole_plate_{name}", *parts.holed_plate(HOLE_CELL, radius, 0.022))
     parts.visual_mesh(body, plate, (x, y, z), material="cover_coat", name=f"hole_{name}")
     if closed:  # a dropped screw is wider than the hole: it rolls over it
-        parts.collider(body, _BOX, (HOLE_CELL, HOLE_CELL, COVER / 2), (x, y, z - COVER / 2 - 0.0005))
-    parts.visual(body, _CYLINDER, (radius, 0.0005), (x, y, z - 0.0215), material="hole_dark")
+        parts.collider(body, BOX, (HOLE_CELL, HOLE_CELL, COVER / 2), (x, y, z - COVER / 2 - 0.0005))
+    parts.visual(body, CYLINDER, (radius, 0.0005), (x, y, z - 0.0215), "hole_dark")
 
 
 def add_legs(body: mujoco.MjsBody, layout: PackLayout) -> None:
     """Add the steel stand below a pack, and the connectors on its left end; only the legs collide."""
     cx, hx, hy = layout.size_x / 2, layout.size_x / 2, layout.size_y / 2
     for x, length in ((0.12, hy + 0.03), (layout.size_x - 0.12, hy + 0.03)):
-        parts.visual(body, _BOX, (0.03, length, 0.03), (x, 0, -layout.thickness - 0.03), material="stand_blue")
+        parts.visual(body, BOX, (0.03, length, 0.03), (x, 0, -layout.thickness - 0.03), "stand_blue")
     for y in (-0.7, 0.0, 0.7):
-        parts.visual(body, _BOX, (hx - 0.06, 0.025, 0.025), (cx, y, -layout.thickness - 0.085),
-                     material="stand_blue")  # fmt: skip
+        parts.visual(body, BOX, (hx - 0.06, 0.025, 0.025), (cx, y, -layout.thickness - 0.085), "stand_blue")
     leg = (layout.top_z - layout.thickness - 0.06) / 2
     for x in (0.12, layout.size_x - 0.12):
-        parts.visual(body, _BOX, (0.02, 0.7, 0.02), (x, 0, 0.16 - layout.top_z), material="stand_blue")
+        parts.visual(body, BOX, (0.02, 0.7, 0.02), (x, 0, 0.16 - layout.top_z), "stand_blue")
         for y in (-0.7, 0.7):
             size, pos = (0.03, 0.03, leg - 0.04), (x, y, -layout.thickness - 0.06 - leg + 0.04)
-            parts.visual(body, _BOX, size, pos, material="stand_blue")
-            parts.collider(body, _BOX, size, pos)
-            parts.visual(body, _CYLINDER, (0.05, 0.02), (x, y, 0.05 - layout.top_z), material="rubber",
-                         quat=(0.70710678, 0.70710678, 0, 0))  # fmt: skip
+            parts.visual(body, BOX, size, pos, "stand_blue")
+            parts.collider(body, BOX, size, pos)
+            parts.visual(body, CYLINDER, (0.05, 0.02), (x, y, 0.05 - layout.top_z), "rubber", quat=ALONG_Y)
     # High-voltage connectors and the service plug on the left end.
     for x in (0.45, 0.62, 0.80):
-        parts.visual(body, _BOX, (0.05, 0.03, 0.035), (x, hy + 0.02, -0.075), material="hv_orange")
-        parts.visual(body, _CYLINDER, (0.022, 0.03), (x, hy + 0.07, -0.075), material="hv_orange",
-                     quat=(0.70710678, 0.70710678, 0, 0))  # fmt: skip
+        parts.visual(body, BOX, (0.05, 0.03, 0.035), (x, hy + 0.02, -0.075), "hv_orange")
+        parts.visual(body, CYLINDER, (0.022, 0.03), (x, hy + 0.07, -0.075), "hv_orange", quat=ALONG_Y)
 
 
 FLATS, COLLAR = 0.8, 0.0042
@@ -126,8 +125,8 @@ def add_meshes(spec: mujoco.MjSpec) -> None:
 def add_bare(body: mujoco.MjsBody, seat: Sequence[float]) -> None:
     """Add a stud at `seat` (3,) whose nut is gone."""
     size, pos = (0.003, 0.006), (seat[0], seat[1], seat[2] + 0.006)
-    parts.visual(body, _CYLINDER, size, pos, material="steel")
-    parts.collider(body, _CYLINDER, size, pos)
+    parts.visual(body, CYLINDER, size, pos, "steel")
+    parts.collider(body, CYLINDER, size, pos)
 
 
 def add_tight(body: mujoco.MjsBody, seat: Sequence[float], label: str) -> PackPart:
@@ -135,8 +134,8 @@ def add_tight(body: mujoco.MjsBody, seat: Sequence[float], label: str) -> PackPa
     x, y, base = seat
     parts.visual_mesh(body, "washer", (x, y, base), material="steel", name=f"{label}_washer")
     parts.visual_mesh(body, "nut", (x, y, base + 0.0012), material="zinc", name=f"{label}_hex")
-    parts.visual(body, _CYLINDER, (0.003, 0.006), (x, y, base + 0.006), material="steel", name=f"{label}_stud")
-    parts.collider(body, _CYLINDER, (0.0055, 0.006), (x, y, base + 0.006))
+    parts.visual(body, CYLINDER, (0.003, 0.006), (x, y, base + 0.006), "steel", name=f"{label}_stud")
+    parts.collider(body, CYLINDER, (0.0055, 0.006), (x, y, base + 0.006))
     geoms = (f"{label}_washer", f"{label}_hex", f"{label}_stud")
     return PackPart("nut", "pack", geoms, np.array([x, y, base + 0.0072]), np.array([0.017, 0.017, 0.012]))
 
@@ -146,10 +145,10 @@ def add_stud(parent: mujoco.MjsBody, draw: ScrewDraw, seat: Sequence[float]) -> 
     body = parent.add_body(name=f"stud_{draw.slot:02d}", pos=list(seat), quat=draw.quat())
     for radius, length in ((draw.shank_diameter / 2, draw.shank_length), (COLLAR, draw.protrusion)):
         size, pos = (radius, length / 2), (0.0, 0.0, length / 2)
-        parts.collider(body, _CYLINDER, size, pos, friction=draw.friction, solref=SOLREF)
+        parts.collider(body, CYLINDER, size, pos, friction=draw.friction, solref=SOLREF)
     size, pos = (draw.shank_diameter / 2, draw.shank_length / 2), (0.0, 0.0, draw.shank_length / 2)
-    parts.visual(body, _CYLINDER, size, pos, material="steel")
-    parts.visual(body, _CYLINDER, (0.0085, 0.0006), (0.0, 0.0, 0.0006), material="steel")
+    parts.visual(body, CYLINDER, size, pos, "steel")
+    parts.visual(body, CYLINDER, (0.0085, 0.0006), (0.0, 0.0, 0.0006), "steel")
 
 
 def add_nut(
@@ -161,7 +160,7 @@ def add_nut(
     for k in range(6):
         a, mid = (k + 0.5) * np.pi / 3, (inner + outer) / 2
         parts.collider(
-            body, _BOX, ((outer - inner) / 2, outer * np.tan(np.pi / 6), height / 2),
+            body, BOX, ((outer - inner) / 2, outer * np.tan(np.pi / 6), height / 2),
             (mid * np.cos(a), mid * np.sin(a), height / 2), quat=(np.cos(a / 2), 0.0, 0.0, np.sin(a / 2)),
             friction=draw.friction, solref=SOLREF, mass=draw.mass / 6,
         )  # fmt: skip
@@ -180,10 +179,9 @@ def add_nut(
 CLEAR = 0.05
 """Distance that things keep from fasteners of the near edge, from trays and from the opened section [m]."""
 ATTEMPTS = 30
-
-_BOX = mujoco.mjtGeom.mjGEOM_BOX
-_CYLINDER = mujoco.mjtGeom.mjGEOM_CYLINDER
-_CAPSULE = mujoco.mjtGeom.mjGEOM_CAPSULE
+_SHAPES = {"box": BOX, "cylinder": CYLINDER, "capsule": CAPSULE}
+_THINGS: list[list[dict[str, Any]]] = list(load_data(__package__, "worlds.yaml")["clutter"].values())
+"""What may lie there, shape by shape."""
 
 
 def add_clutter(spec: mujoco.MjSpec, layout: PackLayout, count: int, rng: np.random.Generator) -> int:
@@ -207,7 +205,12 @@ def add_clutter(spec: mujoco.MjSpec, layout: PackLayout, count: int, rng: np.ran
             continue
         placed.append((x, y))
         body = pack.add_body(name=f"clutter_{k}", pos=[x, y, 0.0], quat=yaw_quat(float(rng.uniform(-np.pi, np.pi))))
-        _THINGS[int(rng.integers(len(_THINGS)))](body)
+        for row in _THINGS[int(rng.integers(len(_THINGS)))]:
+            shape, size, pos = _SHAPES[row["shape"]], row["size"], row["pos"]
+            if "material" in row:
+                parts.visual(body, shape, size, pos, row["material"], quat=row.get("quat", (1.0, 0.0, 0.0, 0.0)))
+            else:
+                parts.collider(body, shape, size, pos)
     return len(placed)
 
 
@@ -220,38 +223,3 @@ def _free(
     )
     beside_trays = (np.hypot(x - trays[:, 0], y - trays[:, 1]) > radius + CLEAR).all()
     return not window and bool(beside_trays) and all(np.hypot(x - a, y - b) > 2 * CLEAR for a, b in placed)
-
-
-def _washer(body: mujoco.MjsBody) -> None:
-    parts.visual(body, _CYLINDER, (0.008, 0.0008), (0.0, 0.0, 0.0008), material="steel")
-    parts.visual(body, _CYLINDER, (0.0035, 0.0009), (0.0, 0.0, 0.0009), material="dark")
-
-
-def _spanner(body: mujoco.MjsBody) -> None:
-    for size, pos in (((0.055, 0.008, 0.003), (0.0, 0.0, 0.003)), ((0.012, 0.014, 0.004), (0.06, 0.0, 0.004))):
-        parts.visual(body, _BOX, size, pos, material="steel")
-        parts.collider(body, _BOX, size, pos)
-
-
-def _cable(body: mujoco.MjsBody) -> None:
-    for k in range(4):
-        pos = (-0.045 + 0.03 * k, 0.008 * (-1) ** k, 0.004)
-        parts.visual(body, _CAPSULE, (0.004, 0.014), pos, material="hv_orange", quat=(0.5, 0.5, 0.5, 0.5))
-    parts.collider(body, _BOX, (0.06, 0.014, 0.004), (0.0, 0.0, 0.004))
-
-
-def _tape(body: mujoco.MjsBody) -> None:
-    parts.visual(body, _CYLINDER, (0.028, 0.011), (0.0, 0.0, 0.011), material="dark")
-    parts.visual(body, _CYLINDER, (0.018, 0.0112), (0.0, 0.0, 0.0112), material="label_white")
-    parts.collider(body, _CYLINDER, (0.028, 0.011), (0.0, 0.0, 0.011))
-
-
-def _plug(body: mujoco.MjsBody) -> None:
-    parts.visual(body, _BOX, (0.018, 0.012, 0.010), (0.0, 0.0, 0.010), material="module_cap")
-    parts.visual(
-        body, _CYLINDER, (0.006, 0.012), (0.026, 0.0, 0.010), material="hv_orange", quat=(0.7071, 0.0, 0.7071, 0.0)
-    )
-    parts.collider(body, _BOX, (0.018, 0.012, 0.010), (0.0, 0.0, 0.010))
-
-
-_THINGS = (_washer, _spanner, _cable, _tape, _plug)

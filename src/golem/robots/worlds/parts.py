@@ -17,6 +17,10 @@ WORLD_CONTACT = 1
 VISUAL_GROUP = 2
 COLLISION_GROUP = 3
 """MuJoCo renders groups 0 to 2 by default, so collision shapes stay invisible."""
+BOX, SPHERE = mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtGeom.mjGEOM_SPHERE
+CYLINDER, CAPSULE = mujoco.mjtGeom.mjGEOM_CYLINDER, mujoco.mjtGeom.mjGEOM_CAPSULE
+ALONG_X, ALONG_Y = (0.70710678, 0.0, 0.70710678, 0.0), (0.70710678, 0.70710678, 0.0, 0.0)
+"""Turns, wxyz, of a cylinder that lies along x, and of one along y."""
 
 
 def visual(
@@ -24,8 +28,8 @@ def visual(
     kind: mujoco.mjtGeom,
     size: Sequence[float],
     pos: Sequence[float] = (0.0, 0.0, 0.0),
+    material: str = "",
     *,
-    material: str,
     name: str = "",
     quat: Sequence[float] = (1.0, 0.0, 0.0, 0.0),
     rgba: Sequence[float] | None = None,
@@ -41,18 +45,12 @@ def visual(
 
 
 def visual_mesh(
-    body: mujoco.MjsBody,
-    mesh: str,
-    pos: Sequence[float] = (0.0, 0.0, 0.0),
-    *,
-    material: str,
-    name: str = "",
-    quat: Sequence[float] = (1.0, 0.0, 0.0, 0.0),
+    body: mujoco.MjsBody, mesh: str, pos: Sequence[float] = (0.0, 0.0, 0.0), *, material: str, name: str
 ) -> mujoco.MjsGeom:
     """Add a mesh that is only seen."""
     return body.add_geom(
-        name=name, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh, pos=list(pos), quat=list(quat),
-        material=material, contype=0, conaffinity=0, group=VISUAL_GROUP, mass=0.0,
+        name=name, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh, pos=list(pos), material=material,
+        contype=0, conaffinity=0, group=VISUAL_GROUP, mass=0.0,
     )  # fmt: skip
 
 
@@ -77,6 +75,21 @@ def collider(
     if solref is not None:
         geom.solref = list(solref)
     return geom
+
+
+def solid(
+    body: mujoco.MjsBody,
+    kind: mujoco.mjtGeom,
+    size: Sequence[float],
+    pos: Sequence[float],
+    material: str,
+    *,
+    friction: float = 0.6,
+    mass: float = 0.0,
+) -> None:
+    """Add a geom that collides, and one like it that is seen."""
+    collider(body, kind, size, pos, friction=friction, mass=mass)
+    visual(body, kind, size, pos, material)
 
 
 def add_mesh(spec: mujoco.MjSpec, name: str, vertices: Array, faces: Faces) -> str:

@@ -154,7 +154,7 @@ def _add(body: mujoco.MjsBody, f: Fixture, T: Array) -> None:
     yaw = math.atan2(T[1, 0], T[0, 0])
     for middle, half in f.boxes:
         geom = parts.collider(
-            body, mujoco.mjtGeom.mjGEOM_BOX, half.tolist(), (T[:3, :3] @ middle + T[:3, 3]).tolist(),
+            body, parts.BOX, half.tolist(), (T[:3, :3] @ middle + T[:3, 3]).tolist(),
             quat=(math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw)),
         )  # fmt: skip
         geom.rgba, geom.group = [*colour, 1.0], parts.VISUAL_GROUP

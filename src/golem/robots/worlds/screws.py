@@ -16,6 +16,7 @@ import numpy as np
 
 from golem.robots.worlds import parts
 from golem.robots.worlds.layout import Kind
+from golem.robots.worlds.parts import BOX, CYLINDER
 from golem.types import Array
 
 FACETS = 12
@@ -167,7 +168,7 @@ def add_bore(parent: mujoco.MjsBody, draw: ScrewDraw, mouth: Sequence[float]) ->
         mid = (inner + RING_OUTER) / 2
         parts.collider(
             body,
-            mujoco.mjtGeom.mjGEOM_BOX,
+            BOX,
             ((RING_OUTER - inner) / 2, half_width, (depth - lift) / 2),
             (mid * np.cos(a), mid * np.sin(a), -(depth + lift) / 2),
             quat=(np.cos(a / 2), 0.0, 0.0, np.sin(a / 2)),
@@ -176,7 +177,7 @@ def add_bore(parent: mujoco.MjsBody, draw: ScrewDraw, mouth: Sequence[float]) ->
         )
     half = DRESSED_FLOOR / 2
     size, pos = (inner * 1.2, inner * 1.2, half), (0.0, 0.0, -draw.engaged - half)
-    parts.collider(body, mujoco.mjtGeom.mjGEOM_BOX, size, pos, friction=draw.friction, solref=SOLREF)
+    parts.collider(body, BOX, size, pos, friction=draw.friction, solref=SOLREF)
 
 
 def loosened(
@@ -207,13 +208,12 @@ def add_screw(
     shank_volume = draw.shank_diameter**2 * draw.shank_length
     head_mass = draw.mass * head_volume / (head_volume + shank_volume)
     common = {"friction": draw.friction, "solref": SOLREF}
-    cylinder = mujoco.mjtGeom.mjGEOM_CYLINDER
     parts.collider(
-        body, cylinder, (draw.head_diameter / 2, draw.head_height / 2), (0, 0, draw.head_height / 2),
+        body, CYLINDER, (draw.head_diameter / 2, draw.head_height / 2), (0, 0, draw.head_height / 2),
         name=f"{name}_head", mass=head_mass, **common,
     )  # fmt: skip
     parts.collider(
-        body, cylinder, (draw.shank_diameter / 2, draw.shank_length / 2), (0, 0, -draw.shank_length / 2),
+        body, CYLINDER, (draw.shank_diameter / 2, draw.shank_length / 2), (0, 0, -draw.shank_length / 2),
         name=f"{name}_shank", mass=draw.mass - head_mass, **common,
     )  # fmt: skip
     _add_looks(spec, body, draw, name)

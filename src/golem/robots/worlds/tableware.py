@@ -9,6 +9,8 @@ import numpy as np
 
 from golem.package_data import load_data
 from golem.robots.worlds import parts
+from golem.robots.worlds.layout import yaw_quat
+from golem.robots.worlds.parts import BOX, CAPSULE, CYLINDER, SPHERE
 
 _DATA = load_data(__package__, "worlds.yaml")["tableware"]
 KINDS: dict[str, tuple[float, float]] = {kind: tuple(row["size"]) for kind, row in _DATA.items()}
@@ -23,9 +25,6 @@ MASSES: dict[str, float] = {kind: row["mass"] for kind, row in _DATA.items()}
 """Of a thing of stoneware, or full [kg]."""
 COLOURS: dict[str, list[tuple[float, float, float]]] = {k: [tuple(c) for c in r["colours"]] for k, r in _DATA.items()}
 """What they may look like (r, g, b)."""
-_BOX = mujoco.mjtGeom.mjGEOM_BOX
-_CYLINDER = mujoco.mjtGeom.mjGEOM_CYLINDER
-_CAPSULE = mujoco.mjtGeom.mjGEOM_CAPSULE
 
 
 def add_object(
@@ -53,8 +52,7 @@ def add_object(
     """
     material = f"{name}_coat"
     spec.add_material(name=material, rgba=[*colour, 1.0], specular=0.5, shininess=0.6)
-    quat = [float(np.cos(yaw / 2)), 0.0, 0.0, float(np.sin(yaw / 2))]
-    body = spec.worldbody.add_body(name=name, pos=list(position), quat=quat)
+    body = spec.worldbody.add_body(name=name, pos=list(position), quat=yaw_quat(yaw))
     if loose:
         body.add_freejoint(name=name)
     names = _BUILDERS[kind](spec, body, name, material)
@@ -84,19 +82,19 @@ def _mug(spec: mujoco.MjSpec, body: mujoco.MjsBody, name: str, material: str) ->
     mesh = parts.add_mesh(spec, f"{name}_shell", *parts.lathe(profile, sides=36))
     parts.visual_mesh(body, mesh, material=material, name=f"{name}_cup")
     _ring(body, radius - WALL / 2, height, 0.9 * MASSES["mug"])
-    parts.collider(body, _CYLINDER, (radius - WALL, 0.004), (0.0, 0.0, 0.006), mass=0.04 * MASSES["mug"])
+    parts.collider(body, CYLINDER, (radius - WALL, 0.004), (0.0, 0.0, 0.006), mass=0.04 * MASSES["mug"])
     # It stands on a ring of balls: on the corners of its wall it would have 61 contacts.
     for turn in 2 * np.pi * np.arange(8) / 8:
         pos = ((radius - WALL / 2) * np.cos(turn), (radius - WALL / 2) * np.sin(turn), FOOT)
-        parts.collider(body, mujoco.mjtGeom.mjGEOM_SPHERE, (FOOT,), pos, mass=0.01 * MASSES["mug"] / 8)
+        parts.collider(body, SPHERE, (FOOT,), pos, mass=0.01 * MASSES["mug"] / 8)
     names = [f"{name}_cup"]
     # Half a ring of capsules on one side: what a finger goes through.
     angles = np.linspace(-np.pi / 2, np.pi / 2, 7)
     arc = np.column_stack([radius - 0.004 + 0.028 * np.cos(angles), 0 * angles, height / 2 + 0.032 * np.sin(angles)])
     for k, (a, b) in enumerate(zip(arc, arc[1:], strict=False)):
-        geom = parts.collider(body, _CAPSULE, (0.0055,), mass=0.05 * MASSES["mug"] / 6)
+        geom = parts.collider(body, CAPSULE, (0.0055,), mass=0.05 * MASSES["mug"] / 6)
         geom.fromto = [*a, *b]
-        seen = parts.visual(body, _CAPSULE, (0.0055,), material=material, name=f"{name}_ear_{k}")
+        seen = parts.visual(body, CAPSULE, (0.0055,), material=material, name=f"{name}_ear_{k}")
         seen.fromto = [*a, *b]
         names.append(f"{name}_ear_{k}")
     return tuple(names)
@@ -110,7 +108,7 @@ def _bowl(spec: mujoco.MjSpec, body: mujoco.MjsBody, name: str, material: str) -
     inner = [(r - WALL, max(z + 0.002, 0.008)) for r, z in reversed(outer)]
     mesh = parts.add_mesh(spec, f"{name}_shell", *parts.lathe([(foot, 0.0), *outer, *inner, (0.002, 0.008)], sides=40))
     parts.visual_mesh(body, mesh, material=material, name=f"{name}_shape")
-    parts.collider(body, _CYLINDER, (foot, 0.005), (0.0, 0.0, 0.005), mass=0.3 * MASSES["bowl"])
+    parts.collider(body, CYLINDER, (foot, 0.005), (0.0, 0.0, 0.005), mass=0.3 * MASSES["bowl"])
     # The wall in rings that follow its curve: a straight one leans by 34 deg, and no finger holds that by friction.
     for low, high in zip(outer[0::2], outer[2::2], strict=False):
         _leaning_ring(body, low, high, 0.7 * MASSES["bowl"] / 3)
@@ -128,7 +126,7 @@ def _can(spec: mujoco.MjSpec, body: mujoco.MjsBody, name: str, material: str) ->
     ):
         mesh = parts.add_mesh(spec, f"{name}_{part}_mesh", *parts.lathe(profile, sides=32))
         parts.visual_mesh(body, mesh, material=look, name=f"{name}_{part}")
-    parts.collider(body, _CYLINDER, (radius, height / 2), (0.0, 0.0, height / 2), mass=MASSES["can"])
+    parts.collider(body, CYLINDER, (radius, height / 2), (0.0, 0.0, height / 2), mass=MASSES["can"])
     return f"{name}_coat", f"{name}_lid", f"{name}_foot"
 
 
@@ -140,16 +138,14 @@ def _bottle(spec: mujoco.MjSpec, body: mujoco.MjsBody, name: str, material: str)
     ]  # fmt: skip
     mesh = parts.add_mesh(spec, f"{name}_shell", *parts.lathe(profile, sides=32))
     parts.visual_mesh(body, mesh, material=material, name=f"{name}_shape")
-    parts.visual(body, _CYLINDER, (0.0155, 0.05 * height), (0, 0, 0.95 * height), material="label_white",
-                 name=f"{name}_cap")  # fmt: skip
-    parts.visual(body, _CYLINDER, (radius + 0.0005, 0.026), (0, 0, 0.096), material="label_white",
-                 name=f"{name}_label")  # fmt: skip
-    parts.collider(body, _CYLINDER, (radius, 0.32 * height), (0, 0, 0.32 * height), mass=0.9 * MASSES["bottle"])
+    parts.visual(body, CYLINDER, (0.0155, 0.05 * height), (0, 0, 0.95 * height), "label_white", name=f"{name}_cap")
+    parts.visual(body, CYLINDER, (radius + 0.0005, 0.026), (0, 0, 0.096), "label_white", name=f"{name}_label")
+    parts.collider(body, CYLINDER, (radius, 0.32 * height), (0, 0, 0.32 * height), mass=0.9 * MASSES["bottle"])
     neck = (0.0155, 0.16 * height)
-    parts.collider(body, _CYLINDER, neck, (0, 0, 0.84 * height), mass=0.08 * MASSES["bottle"])
+    parts.collider(body, CYLINDER, neck, (0, 0, 0.84 * height), mass=0.08 * MASSES["bottle"])
     for share, low in ((0.83, 0.64), (0.62, 0.71)):  # the shoulder, in steps
         step = (share * radius, 0.035 * height)
-        parts.collider(body, _CYLINDER, step, (0, 0, (low + 0.035) * height), mass=0.01 * MASSES["bottle"])
+        parts.collider(body, CYLINDER, step, (0, 0, (low + 0.035) * height), mass=0.01 * MASSES["bottle"])
     return f"{name}_shape", f"{name}_cap", f"{name}_label"
 
 
@@ -164,7 +160,7 @@ def _leaning_ring(body: mujoco.MjsBody, low: tuple[float, float], high: tuple[fl
         turn = 2 * np.pi * k / FACETS
         size = (WALL / 2, np.pi * high[0] / FACETS, length)
         pos = (radius * np.cos(turn), radius * np.sin(turn), height)
-        parts.collider(body, _BOX, size, pos, quat=_turned(turn, lean), mass=mass / FACETS)
+        parts.collider(body, BOX, size, pos, quat=_turned(turn, lean), mass=mass / FACETS)
 
 
 def _ring(body: mujoco.MjsBody, radius: float, height: float, mass: float) -> None:
@@ -173,7 +169,7 @@ def _ring(body: mujoco.MjsBody, radius: float, height: float, mass: float) -> No
         turn = 2 * np.pi * k / FACETS
         size = (WALL / 2, np.pi * radius / FACETS, (height - FOOT) / 2)
         pos = (radius * np.cos(turn), radius * np.sin(turn), (height + FOOT) / 2)
-        parts.collider(body, _BOX, size, pos, quat=_turned(turn, 0.0), mass=mass / FACETS)
+        parts.collider(body, BOX, size, pos, quat=_turned(turn, 0.0), mass=mass / FACETS)
 
 
 def _turned(turn: float, lean: float) -> tuple[float, float, float, float]:

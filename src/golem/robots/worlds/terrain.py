@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 
 from golem.robots.worlds import hall, parts
+from golem.robots.worlds.parts import BOX
 
 FLAT = 1.0
 """Half side of the flat square around the start [m]."""
@@ -22,7 +23,6 @@ TILE = 0.3
 FIELD = 4.0
 """Half side of the field of tiles [m]."""
 
-_BOX = mujoco.mjtGeom.mjGEOM_BOX
 _THICK = 0.1
 
 
@@ -85,6 +85,6 @@ def _block(
     quat: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0),
     shade: float = 0.62,
 ) -> None:
-    geom = parts.collider(body, _BOX, size, pos, quat=quat, friction=hall.FLOOR_FRICTION)
+    geom = parts.collider(body, BOX, size, pos, quat=quat, friction=hall.FLOOR_FRICTION)
     geom.rgba = [shade, shade, 0.95 * shade, 1.0]
     geom.group = parts.VISUAL_GROUP
