@@ -212,8 +212,7 @@ class Exposure:
 class DetectionRequest:
     """Ask a camera and the localizer behind it to stream.
 
-    Attributes:
-        labels: what to look for; empty stops the stream, so that nothing is rendered or inferred unasked.
+    `labels`: what to look for; empty stops the stream, so that nothing is rendered or inferred unasked.
     """
 
     labels: tuple[str, ...] = ()

@@ -78,8 +78,7 @@ class Standing(Protocol):
 class HasGantry(Protocol):
     """A robot that is brought up standing, with a band that keeps it upright until its legs do.
 
-    Attributes:
-        on_gantry: whether there is a band that is still to be let go; false for a robot that hangs and shall hang.
+    `on_gantry`: whether there is a band that is still to be let go; false for a robot that hangs and shall hang.
     """
 
     on_gantry: bool
@@ -92,8 +91,7 @@ class HasGantry(Protocol):
 class HasLivingSensors(Protocol):
     """A robot that says whether its sensors live; of one that does not the gate believes sensors that stand still.
 
-    Attributes:
-        living: whether the last digits of every limb and of the IMU always move, as those of real sensors do.
+    `living`: whether the last digits of every limb and of the IMU always move, as those of real sensors do.
     """
 
     living: bool
@@ -103,8 +101,7 @@ class HasLivingSensors(Protocol):
 class Unmoved(Protocol):
     """A robot that no command moves as it moves a body: measured answers to commands say nothing about it.
 
-    Attributes:
-        unmoved: why, in a few words, e.g. "it is a recording".
+    `unmoved`: why, in a few words, e.g. "it is a recording".
     """
 
     unmoved: str
@@ -141,8 +138,7 @@ class HasStages(Protocol):
     def native(self, joint_offset: Array | None) -> tuple[CompiledStage, CompiledStage] | None:
         """Return the stages that sense and act, on the state of the methods of `Robot`; None where there are none.
 
-        Args:
-            joint_offset: (27,) what calibration knows of the encoders' zeros: reported minus true [rad].
+        `joint_offset`: (27,) what calibration knows of the encoders' zeros: reported minus true [rad].
         """
         ...
 

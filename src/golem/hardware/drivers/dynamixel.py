@@ -71,8 +71,7 @@ def checksum8(data: bytes) -> int:
 class StatusParser:
     """Finds status packets among bytes, and finds the next one after bytes that are none.
 
-    Attributes:
-        skipped: bytes that belonged to no sound packet.
+    `skipped`: bytes that belonged to no sound packet.
     """
 
     def __init__(self) -> None:

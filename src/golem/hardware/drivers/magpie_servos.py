@@ -251,10 +251,7 @@ class MagpieServos:
     """
 
     def __init__(self, config: MagpieServoConfig, connect: Callable[[str, int], SerialPort] = SerialPort) -> None:
-        """Open the bus; nothing moves before the first command.
-
-        Args:
-            connect: opens a port by name and baud rate.
+        """Open the bus; nothing moves before the first command. `connect`: opens a port by name and baud rate.
 
         Raises:
             MissingExtra: pyserial is absent.
@@ -290,8 +287,7 @@ class MagpieServos:
     def step(self, t: float) -> HandState | None:
         """Exchange what there is to exchange at `t` [s]; return a report when one is complete, every 10 ms.
 
-        Raises:
-            HandFault: a servo does not answer for 50 ms, reports an error, or the port is gone.
+        Raises HandFault: a servo does not answer for 50 ms, reports an error, or the port is gone.
         """
         self._started = t if math.isnan(self._started) else self._started
         try:

@@ -228,8 +228,7 @@ class SafetyLimits:
     def from_profile(cls, profile: str = "urdf", ratio: float = LIMIT_RATIO) -> SafetyLimits:
         """Return the limits that use the share `ratio` of the limit profile called `profile`.
 
-        Raises:
-            ConfigError: there is no such profile.
+        Raises ConfigError: there is no such profile.
         """
         limits, gains = load_limits(profile), default_gains()
         middle = 0.5 * (limits.lower + limits.upper)

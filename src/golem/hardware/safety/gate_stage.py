@@ -278,11 +278,7 @@ def _code() -> Any:
 
 
 class GateStage:
-    """Carries a gate's memory into the stage, and back.
-
-    Attributes:
-        stage: the compiled stage.
-    """
+    """Carries a gate's memory into the stage, and back. `stage`: the compiled stage."""
 
     def __init__(self, limits: SafetyLimits) -> None:
         self.stage = CompiledStage(_code(), new_record(GATE))

@@ -29,11 +29,7 @@ class StandingController(Protocol):
 
 
 class StandingGate:
-    """The gate, with a controller behind it that can stand.
-
-    Attributes:
-        gate: the gate.
-    """
+    """The gate, with a controller behind it that can stand. `gate`: the gate."""
 
     def __init__(self, gate: Gate, make: Callable[[], StandingController] | None) -> None:
         """Give the legs to what `make` makes, at the first stop that leaves them sound; None always damps."""

@@ -201,11 +201,9 @@ class IsaacTruth(Truth):
         self._forces = forces
 
     def foot_forces(self) -> Array:
-        """Return the force of the world on the left and the right foot, (2, 3) [N], in the world."""
         return self._forces[self._soles].astype(np.float64)
 
     def touches(self) -> tuple[str, ...]:
-        """Return the bodies other than the feet that touch something that is not the robot, sorted."""
         loaded = set(np.flatnonzero(self._forces.any(axis=1))) - set(self._soles)
         return tuple(sorted(self._links[link] for link in loaded))
 

@@ -247,7 +247,6 @@ class MujocoRobot:
         mujoco.mj_step(self._model, self.data)
 
     def joints(self) -> tuple[Array, Array, Array]:
-        """Return q, dq, tau as the encoders and drives report them; see `Robot`."""
         return self._motors.measure(self.data)
 
     def imu(self) -> Imu:

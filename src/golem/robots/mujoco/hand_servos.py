@@ -71,13 +71,10 @@ def read_hand(h: Record, qpos: int, ctrl: int, fingers: Array, force: Array) -> 
 
 
 class HandServos:
-    """Drives the cranks of one hand.
+    """Drives the cranks of one hand. `memory`: a `HAND`.
 
     The reference runs ahead at the servo's speed whether or not the finger follows; the torque ceiling is what
     limits the force.
-
-    Attributes:
-        memory: a `HAND`.
     """
 
     def __init__(self, model: mujoco.MjModel, side: Side, memory: Records | None = None) -> None:

@@ -72,8 +72,7 @@ class BodyMesh:
 class SpectatorView:
     """The simulated world of one robot, read only.
 
-    Attributes:
-        moving: the visible bodies that can move, in the order of `poses`.
+    `moving`: the visible bodies that can move, in the order of `poses`.
     """
 
     def __init__(

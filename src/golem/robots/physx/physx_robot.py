@@ -222,7 +222,6 @@ class PhysxTruth(Truth):
         return found
 
     def foot_forces(self) -> Array:
-        """Return the force of the world on the left and the right foot, (2, 3) [N], in the world."""
         forces = np.zeros((2, 3))
         for name, impulse in self._touching():
             if self._part_of[name] < len(SIDES):
@@ -230,7 +229,6 @@ class PhysxTruth(Truth):
         return forces
 
     def touches(self) -> tuple[str, ...]:
-        """Return the bodies other than the feet that touch something that is not the robot, sorted."""
         return tuple(sorted({name for name, _ in self._touching() if self._part_of[name] == len(SIDES)}))
 
 

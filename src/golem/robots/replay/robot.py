@@ -185,12 +185,10 @@ class ReplayRobot:
             raise RobotGone(f"The recording {self._file} ends after {self._log.end:.2f} s.")
 
     def joints(self) -> tuple[Array, Array, Array]:
-        """Return the recorded q [rad], dq [rad/s] and tau [N m], each (27,)."""
         state = self._state()
         return state.q, state.dq, state.tau
 
     def imu(self) -> Imu:
-        """Return the recorded sample of the torso IMU."""
         return self._state().imu
 
     def hand(self, side: Side, t: float) -> HandState:

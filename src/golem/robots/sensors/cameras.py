@@ -38,8 +38,7 @@ def rays(info: CameraInfo) -> NDArray[np.float32]:
 def project(info: CameraInfo, points: Array) -> Array:
     """Return the pixels of points, (..., 2) x, y [px], not clipped to the image.
 
-    Args:
-        points: (..., 3) in the optical frame [m], z > 0.
+    `points`: (..., 3) in the optical frame [m], z > 0.
     """
     p = np.asarray(points, np.float64)
     return p[..., :2] / p[..., 2:] * (info.fx, info.fy) + (info.cx, info.cy)

@@ -75,7 +75,6 @@ class Ioniq5Layout(PackLayout):
         )
 
     def kind(self, slot: int) -> Kind:
-        """Return what is in a place."""
         return ioniq5_data().kinds[slot]
 
     def fasteners(self) -> Array:
@@ -83,7 +82,6 @@ class Ioniq5Layout(PackLayout):
         return ioniq5_data().fasteners.copy()
 
     def holes(self) -> Array:
-        """Return the (9, 3) holes in the pack frame."""
         return ioniq5_data().holes.copy()
 
     def reachable(self, reach_y: float = 0.35) -> list[int]:
