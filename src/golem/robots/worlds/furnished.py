@@ -211,12 +211,8 @@ def add_course(spec: mujoco.MjSpec, rng: np.random.Generator, count: int) -> Non
 def _ground(spec: mujoco.MjSpec, half: float, *, lit: bool = True) -> None:
     """Add floor, lights and materials, without the walls of `hall.add_hall`, which are seen only."""
     hall.add_materials(spec)
+    hall.add_floor(spec, half, "").rgba = [0.56, 0.57, 0.58, 1.0]
     world = spec.worldbody
-    world.add_geom(
-        name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[half, half, 0.1], rgba=[0.56, 0.57, 0.58, 1.0],
-        contype=parts.WORLD_CONTACT, conaffinity=parts.WORLD_CONTACT, group=1,
-        friction=[hall.FLOOR_FRICTION, 0.01, 0.001],
-    )  # fmt: skip
     for x, y in ((0.0, 2.0), (6.0, -2.0)) if lit else ():
         world.add_light(pos=[x, y, HEIGHT], dir=[0, 0, -1], diffuse=[0.5] * 3, ambient=[0.15] * 3, castshadow=False)
 

@@ -51,13 +51,8 @@ def add_hall(spec: mujoco.MjSpec, half: float = 6.0, *, marks: bool = True, stan
         name="concrete", specular=0.2, shininess=0.2, reflectance=0.0, texrepeat=[2, 2], texuniform=True
     )
     floor.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "concrete"
-    world = spec.worldbody
-    world.add_geom(
-        name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[half + 2, half + 2, 0.1], material="concrete",
-        contype=parts.WORLD_CONTACT, conaffinity=parts.WORLD_CONTACT, group=1,
-        friction=[FLOOR_FRICTION, 0.01, 0.001],
-    )  # fmt: skip
-    hall = world.add_body(name="hall", pos=[stance.x, stance.y, 0.0], quat=yaw_quat(stance.yaw))
+    add_floor(spec, half + 2, "concrete")
+    hall = spec.worldbody.add_body(name="hall", pos=[stance.x, stance.y, 0.0], quat=yaw_quat(stance.yaw))
     for side in (-1, 1) if marks else ():
         parts.visual(
             hall,
@@ -76,6 +71,15 @@ def add_hall(spec: mujoco.MjSpec, half: float = 6.0, *, marks: bool = True, stan
     for y in (-4, -2, 0, 2, 4):
         parts.visual(hall, BOX, (0.08, 0.08, 2.0), (half - 0.1, y, 2.0), "aluminium")
     add_lamps(spec, stance)
+
+
+def add_floor(spec: mujoco.MjSpec, half: float, material: str) -> mujoco.MjsGeom:
+    """Add a square floor that collides, its half side `half` [m], and return it."""
+    return spec.worldbody.add_geom(
+        name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[half, half, 0.1], material=material,
+        contype=parts.WORLD_CONTACT, conaffinity=parts.WORLD_CONTACT, group=1,
+        friction=[FLOOR_FRICTION, 0.01, 0.001],
+    )  # fmt: skip
 
 
 def add_lamps(spec: mujoco.MjSpec, stance: PlanarPose = HERE) -> None:

@@ -243,14 +243,9 @@ def _add_materials(spec: mujoco.MjSpec, layout: KitchenLayout) -> None:
 
 def _add_room(spec: mujoco.MjSpec, at: tuple[float, float]) -> None:
     world = spec.worldbody
-    world.add_geom(
-        name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[5.0, 5.0, 0.1], material="boards",
-        contype=parts.WORLD_CONTACT, conaffinity=parts.WORLD_CONTACT, group=1,
-        friction=[hall.FLOOR_FRICTION, 0.01, 0.001],
-    )  # fmt: skip
+    hall.add_floor(spec, 5.0, "boards")
     for size, x, y in (((0.05, 4.0, 1.35), 1.40, 0.0), ((3.0, 0.05, 1.35), -1.6, 3.2), ((3.0, 0.05, 1.35), -1.6, -3.2)):
-        pos, material = (x + at[0], y + at[1], 1.35), "wall_paint"
-        parts.solid(world, BOX, size, pos, material)
+        parts.solid(world, BOX, size, (x + at[0], y + at[1], 1.35), "wall_paint")
     for x, y, level in ((0.1, 0.7, 0.40), (0.1, -0.9, 0.36), (-1.2, 0.0, 0.28)):
         world.add_light(
             pos=[x + at[0], y + at[1], 2.6], dir=[0.45, -0.3 * y, -1.0], diffuse=[level] * 3,

@@ -32,26 +32,17 @@ def add_tray(spec: mujoco.MjSpec, layout: PackLayout, place: TrayPlace) -> None:
     paint = "stand_blue" if place.kind == "nut" else "tray_teal"
     body = spec.worldbody.add_body(name=place.name, pos=[place.x, place.y, place.z], quat=yaw_quat(place.yaw))
     hx, hy, hz = sx / 2, sy / 2, sz / 2
-    walls = [
-        ((hx, hy, WALL / 2), (0.0, 0.0, WALL / 2)),
-        ((WALL / 2, hy, hz), (hx - WALL / 2, 0.0, hz)),
-        ((WALL / 2, hy, hz), (-hx + WALL / 2, 0.0, hz)),
-        ((hx, WALL / 2, hz), (0.0, hy - WALL / 2, hz)),
-        ((hx, WALL / 2, hz), (0.0, -hy + WALL / 2, hz)),
-    ]
+    walls = [((hx, hy, WALL / 2), (0.0, 0.0, WALL / 2))]
+    walls += [((WALL / 2, hy, hz), (side * (hx - WALL / 2), 0.0, hz)) for side in (1, -1)]
+    walls += [((hx, WALL / 2, hz), (0.0, side * (hy - WALL / 2), hz)) for side in (1, -1)]
     for k, (size, pos) in enumerate(walls):
         (a, b, c), (x, y, z), deep = size, pos, 0.0 if k else 0.5 * DEEP
         parts.collider(body, BOX, (a, b, c + deep), (x, y, z - deep), friction=0.8)
         parts.visual(body, BOX, size, pos, paint, name=f"{place.name}_part_{k}")
     rim = 0.006
-    for k, (size, pos) in enumerate(
-        [
-            ((rim / 2, hy + rim / 2, 0.0015), (hx, 0.0, sz)),
-            ((rim / 2, hy + rim / 2, 0.0015), (-hx, 0.0, sz)),
-            ((hx + rim / 2, rim / 2, 0.0015), (0.0, hy, sz)),
-            ((hx + rim / 2, rim / 2, 0.0015), (0.0, -hy, sz)),
-        ]
-    ):
+    rims = [((rim / 2, hy + rim / 2, 0.0015), (side * hx, 0.0, sz)) for side in (1, -1)]
+    rims += [((hx + rim / 2, rim / 2, 0.0015), (0.0, side * hy, sz)) for side in (1, -1)]
+    for k, (size, pos) in enumerate(rims):
         parts.visual(body, BOX, size, pos, paint, name=f"{place.name}_rim_{k}")
     x, y, _, _ = np.linalg.inv(layout.pose()) @ (place.x, place.y, place.z, 1.0)
     over_cover = 0.0 < x < layout.size_x and abs(y) < layout.size_y / 2
@@ -241,13 +232,10 @@ def _add_window(body: mujoco.MjsBody, layout: PackLayout) -> list[PackPart]:
     parts.collider(body, BOX, (hx, hy, 0.01), (cx, cy, floor - 0.01))
     parts.visual(body, BOX, (hx, hy, 0.01), (cx, cy, floor - 0.012), "dark")
     lip = 0.004
-    for size, pos in (
-        ((hx + lip, lip / 2, 0.001), (cx, y0 - lip / 2, 0.0005)),
-        ((hx + lip, lip / 2, 0.001), (cx, y1 + lip / 2, 0.0005)),
-        ((lip / 2, hy, 0.001), (x0 - lip / 2, cy, 0.0005)),
-        ((lip / 2, hy, 0.001), (x1 + lip / 2, cy, 0.0005)),
-    ):
-        parts.visual(body, BOX, size, pos, "steel")
+    for y in (y0 - lip / 2, y1 + lip / 2):
+        parts.visual(body, BOX, (hx + lip, lip / 2, 0.001), (cx, y, 0.0005), "steel")
+    for x in (x0 - lip / 2, x1 + lip / 2):
+        parts.visual(body, BOX, (lip / 2, hy, 0.001), (x, cy, 0.0005), "steel")
     columns = int((y1 - y0 - 0.02) // (2 * STUD_PITCH))
     pitch = 2 * STUD_PITCH
     start = cy - pitch * columns / 2
