@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from golem.errors import ConfigError, MissingEnvironment
-from golem.robots.isaaclab.isaac_robot import VARIABLE, IsaacLabConfig, IsaacLabRobot, Layers, WorkerLink, isaac_python
+from golem.robots.isaaclab.isaac_robot import VARIABLE, IsaacLabConfig, IsaacLabRobot, Layers, isaac_python, take_worker
 from golem.robots.isaaclab.isaac_worker import WorkerScene, reply_type, request_type
 from golem.runtime.lockstep import start_posture
 
@@ -47,7 +47,7 @@ def test_the_option_goes_before_the_variable(monkeypatch: pytest.MonkeyPatch) ->
 )
 def test_a_python_without_isaac_lab_is_refused(python: str, why: str) -> None:
     with pytest.raises(ConfigError, match=f"does not run under {python}: {why}"):
-        WorkerLink(Path(python), SCENE, Layers("#usda 1.0\n", "#usda 1.0\n"))
+        take_worker(Path(python), SCENE, Layers("#usda 1.0\n", "#usda 1.0\n"))
 
 
 @pytest.mark.parametrize(

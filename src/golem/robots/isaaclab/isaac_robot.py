@@ -8,7 +8,6 @@ import os
 import subprocess
 import tempfile
 import weakref
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Literal, NamedTuple, get_args
@@ -98,8 +97,8 @@ class WorkerProcess:
         """Whether it can answer."""
         return self._process.poll() is None
 
-    def ask(self, fields: Mapping[str, object]) -> NDArray[np.void]:
-        """Send a request and return the reply, one record; see `WorkerLink.ask`."""
+    def ask(self, **fields: object) -> NDArray[np.void]:
+        """Send a `request_type` of `fields`, else zero; return the reply. Raises ServiceUnavailable: it has died."""
         self._request[...] = 0
         for name, value in fields.items():
             self._request[name] = value
@@ -146,40 +145,24 @@ _idle: list[WorkerProcess] = []
 """The worker that nobody uses, if there is one: starting another takes far longer than putting its robot back."""
 
 
-class WorkerLink:
-    """Exchanges messages with a worker, whose packages have `versions`, until it is closed or nobody holds it."""
+def take_worker(python: Path, scene: WorkerScene, layers: Layers) -> WorkerProcess:
+    """Return the idle worker, if it simulates the same, or start one, which takes up to minutes.
 
-    def __init__(self, python: Path, scene: WorkerScene, layers: Layers) -> None:
-        """Take an idle worker that simulates the same, or start one, which takes up to minutes.
+    Args:
+        python: of an environment with Isaac Lab.
+        scene: what to simulate; `robot` and `world` are filled in.
+        layers: what these files are to hold.
 
-        Args:
-            python: of an environment with Isaac Lab.
-            scene: what to simulate; `robot` and `world` are filled in by the link.
-            layers: what these files are to hold.
-
-        Raises:
-            ConfigError: Isaac Lab does not run there.
-        """
-        key = os.getpid(), str(python), json.dumps(scene), layers
-        fitting = [process for process in _idle if process.key == key and process.alive]
-        if fitting:
-            process = fitting[0]
-            _idle.remove(process)
-        else:
-            process = WorkerProcess(key, python, scene, layers)
-        self._process, self.versions = process, process.versions
-        self._give_back = weakref.finalize(self, _keep, process)
-
-    def ask(self, **fields: object) -> NDArray[np.void]:
-        """Send a `request_type` of `fields`, else zero; return the reply. Raises ServiceUnavailable: it has died."""
-        return self._process.ask(fields)
-
-    def close(self) -> None:
-        """Leave the worker to the next link. Closing twice does nothing."""
-        self._give_back()
+    Raises:
+        ConfigError: Isaac Lab does not run there.
+    """
+    key = os.getpid(), str(python), json.dumps(scene), layers
+    if _idle and _idle[0].key == key and _idle[0].alive:
+        return _idle.pop()
+    return WorkerProcess(key, python, scene, layers)
 
 
-def _keep(process: WorkerProcess) -> None:
+def keep_worker(process: WorkerProcess) -> None:
     """Let `process` be the idle worker, and end the one that was."""
     for former in _idle:
         former.end()
@@ -267,7 +250,8 @@ class IsaacLabRobot(OtherEngineRobot):
             "bodies": links,
             "torso": "torso_link",
         }
-        self._worker = WorkerLink(python, scene, layers)
+        self._worker = take_worker(python, scene, layers)
+        self._give_back = weakref.finalize(self, keep_worker, self._worker)
         base = self._base.qposadr[0]
         self._worker.ask(place=1.0, root=self.data.qpos[base : base + 7], q=self.data.qpos[self._joint_map.q])
         self.truth: IsaacTruth = IsaacTruth(model, self.data, links)
@@ -290,5 +274,5 @@ class IsaacLabRobot(OtherEngineRobot):
 
     def close(self) -> None:
         """Leave the worker to the next robot, and release the rendering context and the LiDAR."""
-        self._worker.close()
+        self._give_back()
         super().close()
