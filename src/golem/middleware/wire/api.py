@@ -5,8 +5,6 @@ its call and carries a status code, 0 for success. Members and types: unitree_sd
 unitree_sdk2py/idl/unitree_api/msg/dds_. Both end in a string and a sequence of bytes, so that their size varies. A
 length that a payload claims is compared with what is there before anything is done with it.
 
-Remote calls on a DDS domain: a service takes calls from `rt/api/<service>/request` and answers on `.../response`.
-
 Everybody who calls a service reads the answers to everybody: an answer belongs to the call whose identity it repeats.
 """
 
@@ -17,7 +15,6 @@ from dataclasses import dataclass
 from typing import Final
 
 from golem.middleware.dds.base import ENCAPSULATION, Payload, Reader, Sample, Writer
-from golem.middleware.wire import api
 from golem.middleware.wire.struct_layout import WireError, check_encapsulation
 
 
@@ -34,7 +31,7 @@ class RpcServer:
         for sample in self._reader.take():
             if sample.alive:
                 try:
-                    requests.append(api.decode_request(sample.payload))
+                    requests.append(decode_request(sample.payload))
                 except WireError as error:
                     self.refused += 1
                     self.refusal = str(error)
@@ -42,7 +39,7 @@ class RpcServer:
 
     def reply(self, response: Response) -> None:
         """Send an answer. Calls with `noreply` want none. Raises WireError: it cannot be sent."""
-        self._writer.write(api.encode_response(response))
+        self._writer.write(encode_response(response))
 
     def close(self) -> None:
         """Stop offering the service."""
@@ -63,7 +60,7 @@ class RpcClient:
 
     def send(self, request: ApiRequest) -> None:
         """Send a call. Raises WireError: it cannot be sent."""
-        self._writer.write(api.encode_request(request))
+        self._writer.write(encode_request(request))
 
     def take(self) -> list[Response]:
         """Return the answers that came since the last time, oldest first, to whomever they are."""
@@ -79,7 +76,7 @@ def _response(sample: Sample) -> Response | None:
     if not sample.alive:
         return None
     try:
-        return api.decode_response(sample.payload)
+        return decode_response(sample.payload)
     except WireError:
         return None  # whose call it answers cannot be known; that call times out
 

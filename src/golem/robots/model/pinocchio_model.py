@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from golem.robots.model import magpie_model, pinocchio_model
+from golem.robots.model import magpie_model
 from golem.robots.model.spatial import Inertial
 from golem.robots.model.table import BASE_LINK, FRAMES, JOINTS, LINKS, T_TORSO_HEAD_OPTICAL
 from golem.types import SIDES, Array
@@ -16,7 +16,7 @@ class Kinematics:
 
     def __init__(self) -> None:
         """Build the model with hands, fixed at base_link."""
-        self._model = pinocchio_model.build(hands=True)
+        self._model = build(hands=True)
         self._data = self._model.createData()
         self._ids = {frame.name: i for i, frame in enumerate(self._model.frames)}
         self._q: Array | None = np.zeros(self._model.nq)
