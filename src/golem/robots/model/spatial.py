@@ -33,17 +33,11 @@ def rpy_of(rotation: Array) -> tuple[float, float, float]:
 
 def quat_of(rotation: Array) -> Array:
     """Return the (4,) unit quaternion wxyz, w >= 0, of a (3, 3) rotation."""
-    k = np.array(
-        [
-            [np.trace(rotation), 0.0, 0.0, 0.0],
-            [rotation[2, 1] - rotation[1, 2], 0.0, 0.0, 0.0],
-            [rotation[0, 2] - rotation[2, 0], 0.0, 0.0, 0.0],
-            [rotation[1, 0] - rotation[0, 1], 0.0, 0.0, 0.0],
-        ]
-    )
     # The eigenvector of the largest eigenvalue of K (Bar-Itzhack 2000) is the quaternion, at any angle.
+    k, twice = np.empty((4, 4)), rotation - rotation.T
+    k[0, 0] = np.trace(rotation)
+    k[0, 1:] = k[1:, 0] = twice[2, 1], twice[0, 2], twice[1, 0]
     k[1:, 1:] = rotation + rotation.T - np.trace(rotation) * np.eye(3)
-    k[0, 1:] = k[1:, 0]
     q = np.linalg.eigh(k)[1][:, -1]
     return q if q[0] >= 0 else -q
 
@@ -105,10 +99,8 @@ class Inertial:
 
     def six(self) -> tuple[float, float, float, float, float, float]:
         """Return ixx, ixy, ixz, iyy, iyz, izz [kg m^2]."""
-        i = self.inertia
-        return (
-            float(i[0, 0]), float(i[0, 1]), float(i[0, 2]), float(i[1, 1]), float(i[1, 2]), float(i[2, 2])
-        )  # fmt: skip
+        xx, xy, xz, yy, yz, zz = self.inertia[np.triu_indices(3)].tolist()
+        return xx, xy, xz, yy, yz, zz
 
     def mirrored(self) -> Inertial:
         """Return the mirror image in the xz plane (left for right)."""

@@ -40,13 +40,8 @@ def load_limits(profile: str = "urdf") -> Limits:
     """Return the limits of the 27 joints, of `"urdf"` or `"paper"`: other torques. Raises ConfigError: no such one."""
     if profile not in TORQUE_PROFILES:
         raise unknown_name("torque limit profile", profile, TORQUE_PROFILES)
-    torque = [j.torque[profile] for j in JOINTS]
-    return Limits(
-        lower=np.array([j.lower for j in JOINTS]),
-        upper=np.array([j.upper for j in JOINTS]),
-        velocity=np.array([j.velocity for j in JOINTS]),
-        torque=np.array(torque),
-    )
+    rows = [(j.lower, j.upper, j.velocity, j.torque[profile]) for j in JOINTS]
+    return Limits(*np.array(rows).T.copy())
 
 
 BASE_LINK = "pelvis"
