@@ -150,9 +150,7 @@ def diagnostics(t: float, statuses: Sequence[diagnostic_msgs.DiagnosticStatus]) 
     return diagnostic_msgs.DiagnosticArray(header(t), list(statuses))
 
 
-def diagnostic(
-    level: int, name: str, message: str, values: Mapping[str, object], hardware: str = ""
-) -> diagnostic_msgs.DiagnosticStatus:
+def diagnostic(level: int, name: str, message: str, values: Mapping[str, object]) -> diagnostic_msgs.DiagnosticStatus:
     """Return the health of one part.
 
     Args:
@@ -160,10 +158,9 @@ def diagnostic(
         name: of the part.
         message: one line for a person.
         values: figures behind it.
-        hardware: which device.
     """
     pairs = [diagnostic_msgs.KeyValue(key, str(value)) for key, value in values.items()]
-    return diagnostic_msgs.DiagnosticStatus(level, name, message, hardware, pairs)
+    return diagnostic_msgs.DiagnosticStatus(level, name, message, "", pairs)
 
 
 def base_estimate(estimate: BaseEstimate) -> golem_interfaces.BaseEstimate:

@@ -38,14 +38,7 @@ class Owner(Protocol):
 
 
 class _Endpoint:
-    """What writers and readers have in common.
-
-    Attributes:
-        qos: what it offers or requests.
-        guid: 16 bytes, unique on the domain.
-        handle: instance handle (uint64) by which its participant knows it.
-        entity: Cyclone's name for it.
-    """
+    """What writers and readers have in common; `entity` is Cyclone's name for it, see `base.Writer` for the others."""
 
     kind: str
 
