@@ -47,8 +47,7 @@ class Navigation:
     def remaining(self) -> PlanarPose:
         """Where the goal is as seen from the robot, by the navigator; before its first step, by the odometry.
 
-        Raises:
-            StageFailed: the odometry has fallen silent, or the robot's place in the map is not known.
+        Raises StageFailed: the odometry has fallen silent, or the robot's place in the map is not known.
         """
         pose = self._context.legs.pose
         if self.newest is not None:

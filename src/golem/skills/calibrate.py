@@ -149,7 +149,7 @@ class CalibrateReport:
 class Calibrate:
     """Show the head camera both hands in many postures, and find its mount and the arms' encoder zeros.
 
-    The hands wear their cuffs of tags. Stages: `look`, `fit`, `done`.
+    The hands wear their cuffs of tags. Stages (see `Skill`): `look`, `fit`, `done`.
     """
 
     Goal = CalibrateGoal
@@ -159,11 +159,9 @@ class Calibrate:
         self.config = config or KeptFileConfig()
 
     def timeout(self, goal: CalibrateGoal) -> float:
-        """Return the time it may take [s]; see `Skill`."""
         return 60.0 + 2 * goal.views * (8.0 + goal.settle)
 
     async def run(self, context: Context, goal: CalibrateGoal) -> SkillResult:
-        """Calibrate; see `Skill`."""
         start = context.t
         file = kept_file(self.config.folder, goal.file, read_calibration) if goal.file else None
         looks, views = TagLooks(context, CAMERA), list[TagView]()

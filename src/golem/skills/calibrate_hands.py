@@ -67,7 +67,7 @@ class CalibrateHandsReport:
 class CalibrateHands:
     """Show each palm camera the other hand in many postures, and find where it sits.
 
-    The hands wear their cuffs of tags. Stages: `look`, `fit`, `done`.
+    The hands wear their cuffs of tags. Stages (see `Skill`): `look`, `fit`, `done`.
     """
 
     Goal = CalibrateHandsGoal
@@ -77,11 +77,9 @@ class CalibrateHands:
         self.config = config or KeptFileConfig()
 
     def timeout(self, goal: CalibrateHandsGoal) -> float:
-        """Return the time it may take [s]; see `Skill`."""
         return 60.0 + 2 * goal.views * (10.0 + goal.settle)
 
     async def run(self, context: Context, goal: CalibrateHandsGoal) -> SkillResult:
-        """Calibrate; see `Skill`."""
         start = context.t
         file = kept_file(self.config.folder, goal.file, read_calibration) if goal.file else None
         found: list[Calibration] = []

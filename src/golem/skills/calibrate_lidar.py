@@ -80,7 +80,7 @@ class CalibrateLidarReport:
 class CalibrateLidar:
     """Look at floor, walls and furniture with head camera and LiDAR, turn the torso, and find where the LiDAR sits.
 
-    The head camera is calibrated first. Stages: `look`, `fit`, `done`.
+    The head camera is calibrated first. Stages (see `Skill`): `look`, `fit`, `done`.
     """
 
     Goal = CalibrateLidarGoal
@@ -90,11 +90,9 @@ class CalibrateLidar:
         self.config = config or KeptFileConfig()
 
     def timeout(self, goal: CalibrateLidarGoal) -> float:
-        """Return the time it may take [s]; see `Skill`."""
         return 60.0 + goal.views * (15.0 + goal.settle)
 
     async def run(self, context: Context, goal: CalibrateLidarGoal) -> SkillResult:
-        """Calibrate; see `Skill`."""
         start = context.t
         file = kept_file(self.config.folder, goal.file, read_calibration)
         before = read_calibration(file) if file.exists() else None

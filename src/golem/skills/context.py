@@ -197,11 +197,7 @@ class Context:
 
     @property
     def T_odom_map(self) -> PlanarPose:
-        """Where the frame of the map is in odom.
-
-        Raises:
-            StageFailed: nobody says.
-        """
+        """Where the frame of the map is in odom. Raises StageFailed: nobody says."""
         place = self.bus.latest(topics.MAP_POSE)
         if place is None:
             raise StageFailed("navigate", "mapper", "The robot's place in the map is not known.")
@@ -222,11 +218,7 @@ class Context:
 
     @property
     def joints(self) -> Array:
-        """(15,) measured joints of torso, left arm, right arm [rad].
-
-        Raises:
-            StageFailed: the motors do not report.
-        """
+        """(15,) measured joints of torso, left arm, right arm [rad]. Raises StageFailed: the motors do not report."""
         state = self.bus.latest(topics.LOW_STATE)
         if state is None:
             raise StageFailed("move", "robot", "The motors do not report.")
@@ -236,8 +228,7 @@ class Context:
     def commanded_joints(self) -> Array:
         """(15,) joints of torso, left arm, right arm that the motors are being sent to [rad].
 
-        Raises:
-            StageFailed: the motors do not report.
+        Raises StageFailed: the motors do not report.
         """
         command = self.bus.latest(topics.ARM_COMMAND)
         return self.joints if command is None else command.q
@@ -312,8 +303,7 @@ class Context:
     async def properties(self, label: str) -> Properties:
         """Return what a thing of class `label` is like, as the stack's source of properties has it.
 
-        Raises:
-            ConfigError: it knows nothing of that name.
+        Raises ConfigError: it knows nothing of that name.
         """
         source = self.modules.properties
         return await self.think(lambda: source.properties(label), source.latency)
@@ -341,15 +331,12 @@ class Context:
     async def run(self, name: str, goal: object, timeout: float | None = None) -> SkillResult:
         """Pursue `goal` with another skill of the stack, and return how that ended; its feedback is heard as its own.
 
-        Cancelled meanwhile, it cancels that skill, gives it the time to leave the robot safe, and lets
-        `SkillCancelled` pass, however that skill then ended.
+        Cancelled meanwhile, it cancels that skill, gives it the time to leave the robot safe, and lets `SkillCancelled`
+        pass, however that skill then ended. Raises ConfigError: there is no such skill, or the goal is none of it.
 
         Args:
             goal: of its kind, or its fields by name, as `{"times": 2}`.
             timeout: robot time after which it is cancelled [s]; by default what the skill itself allows.
-
-        Raises:
-            ConfigError: there is no such skill, or the goal is none of it.
         """
         return await call(self, name, goal, timeout)
 

@@ -31,8 +31,7 @@ STYLE = "body{font:14px sans-serif}td,th{padding:2px 8px;text-align:left;vertica
 def write_inventory(book: JobFile) -> Path:
     """Write the inventory beside the file of the job, `NAME_inventory.csv` and `.html`; returns the page's path.
 
-    Raises:
-        OutputError: it cannot be written.
+    Raises OutputError: it cannot be written.
     """
     rows = [_row(one) for one in book.fasteners]
     table = StringIO()
@@ -91,8 +90,8 @@ JOB = 4 * 3600.0
 class Disassemble:
     """Take fasteners out of a pack: all of a list, by a plan and with a file that keeps what was done, or some.
 
-    Stages: those of `navigate`, `dock` and `pick`, and `plan`, `job`, `done`. Without a list it docks, picks, and docks
-    again where a pick says that nothing more is within reach.
+    Stages (see `Skill`): those of `navigate`, `dock` and `pick`, and `plan`, `job`, `done`. Without a list it docks,
+    picks, and docks again where a pick says that nothing more is within reach.
     """
 
     Goal, Result = DisassembleGoal, DisassembleReport
@@ -102,12 +101,10 @@ class Disassemble:
         self._folder = Path((config or KeptFileConfig()).folder)
 
     def timeout(self, goal: DisassembleGoal) -> float:
-        """Return the time it may take [s]; see `Skill`."""
         some = 180.0 * (goal.docks + 1) + 120.0 * (goal.count + goal.docks)
         return JOB if goal.list or goal.job else some
 
     async def run(self, context: Context, goal: DisassembleGoal) -> SkillResult:
-        """Take out what is asked for; see `Skill`."""
         return await (self._job(context, goal) if goal.list or goal.job else self._some(context, goal))
 
     async def _job(self, context: Context, goal: DisassembleGoal) -> SkillResult:

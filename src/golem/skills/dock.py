@@ -128,13 +128,9 @@ class DockReport:
 
 @dataclass(frozen=True, slots=True)
 class _View:
-    """What one look says.
+    """What one look says: the stance (as seen from the robot), and the near edge.
 
-    Attributes:
-        left: the stance as seen from the robot.
-        edge: the near edge.
-        here: how the robot stands now; None where no fastener was seen.
-        best: how it could; likewise.
+    Where some fastener was seen also how the robot stands `here`, and how it could at `best`.
     """
 
     left: PlanarPose
@@ -151,8 +147,8 @@ class _View:
 class Dock:
     """Stand before the pack where the hands can work: look, approach with small steps, settle, look again.
 
-    Stages: `look`, `approach`, `done`. It ends when the stance is good enough, when an approach has won nothing, or
-    after those of the goal. Where some fastener is within reach it has succeeded.
+    Stages (see `Skill`): `look`, `approach`, `done`. It ends when the stance is good enough, when an approach has won
+    nothing, or after those of the goal. Where some fastener is within reach it has succeeded.
     """
 
     Goal, Result = DockGoal, DockReport
@@ -162,11 +158,9 @@ class Dock:
         """(3,) where it was seen last, in the odometry's frame [m]."""
 
     def timeout(self, goal: DockGoal) -> float:
-        """Return the time it may take [s]; see `Skill`."""
         return (goal.approaches + 1) * (TIMEOUT + SETTLE + LOOK + CAMERA + 2.0) + MARGIN
 
     async def run(self, context: Context, goal: DockGoal) -> SkillResult:
-        """Dock; see `Skill`."""
         try:
             return await self._dock(context, goal)
         except StageFailed as failure:

@@ -55,7 +55,7 @@ class ExploreGoal:
 class Explore:
     """Map the hall by walking to where the map ends, come home, and keep the map if asked to.
 
-    Stages: `locate`, `explore`, `home`, `save`, `done`. A frontier that cannot be reached is left out.
+    Stages (see `Skill`): `locate`, `explore`, `home`, `save`, `done`. A frontier that cannot be reached is left out.
     """
 
     Goal = ExploreGoal
@@ -64,11 +64,9 @@ class Explore:
         self.config = config or KeptFileConfig()
 
     def timeout(self, goal: ExploreGoal) -> float:
-        """Return the time it may take [s]; see `Skill`."""
         return goal.timeout + 2.0 * LEG + FIRST_MAP + SAVING + MARGIN
 
     async def run(self, context: Context, goal: ExploreGoal) -> SkillResult:
-        """Explore; see `Skill`."""
         with standing_after_failure(context):
             return await self._explore(context, goal)
 

@@ -112,8 +112,7 @@ class JobFile(SqliteFile):
     def __init__(self, path: Path, listed: Sequence[Listed] = ()) -> None:
         """Open or make the job at `path`; a new one is of what is `listed`, an old one of nothing else.
 
-        Raises:
-            JobFault: there is no such job and no list, the job is of another list, or the file cannot be used.
+        Raises JobFault: there is no such job and no list, the job is of another list, or the file cannot be used.
         """
         if not listed and not path.exists():
             raise JobFault(f"There is no job {path}; name a list to begin one.")
@@ -163,8 +162,7 @@ class JobFile(SqliteFile):
     ) -> None:
         """Keep what happened to a fastener, for good, and then change it.
 
-        Raises:
-            JobFault: the disk is full or cannot be written.
+        Raises JobFault: the disk is full or cannot be written.
         """
         pose = (None,) * 3 if stance is None else (stance.x, stance.y, stance.yaw)
         names = "number, fate, reason, side, tray, x, y, yaw, t, picture"

@@ -26,14 +26,12 @@ class KeptFileConfig:
 def check_file_name(name: str, ending: str = "") -> None:
     """Check the name of a file that a goal asks for; the empty one asks for none.
 
-    A goal may come from anybody on the domain, so it may not lead out of the folder of the skill.
+    A goal may come from anybody on the domain, so it may not lead out of the folder of the skill. Raises ConfigError:
+    it is no plain name, or ends otherwise.
 
     Args:
         name: as the goal has it.
         ending: what it ends in, e.g. `".json"`.
-
-    Raises:
-        ConfigError: it is no plain name, or ends otherwise.
     """
     if name and not (name.endswith(ending) and _PLAIN.fullmatch(name.removesuffix(ending))):
         ends = f" and '{ending}' at the end" if ending else " and no ending"
@@ -46,10 +44,8 @@ def check_file_name(name: str, ending: str = "") -> None:
 def kept_file(folder: str, name: str, read: Callable[[Path], object]) -> Path:
     """Return the path of the file `name`, which `check_file_name` has passed, in `folder`.
 
-    What is there already is only replaced if `read` takes it for a file of the same kind; a link never is.
-
-    Raises:
-        ConfigError: there is a link or something else of that name.
+    What is there already is only replaced if `read` takes it for a file of the same kind; a link never is. Raises
+    ConfigError: there is a link or something else of that name.
     """
     path = Path(folder) / name
     if path.is_symlink():

@@ -44,17 +44,15 @@ class NavigateGoal:
 class Navigate:
     """Walk to a pose around what is in the way, and stand there; cancelled, the robot stands where it is.
 
-    Stages: `locate` (the place in the map is looked for), `navigate`, `done`.
+    Stages (see `Skill`): `locate` (the place in the map is looked for), `navigate`, `done`.
     """
 
     Goal = NavigateGoal
 
     def timeout(self, goal: NavigateGoal) -> float:
-        """Return the time it may take [s]; see `Skill`."""
         return goal.timeout + FIRST_MAP + MARGIN
 
     async def run(self, context: Context, goal: NavigateGoal) -> SkillResult:
-        """Go to one pose; see `Skill`."""
         with standing_after_failure(context):
             target, frame = await self._target(context, goal)
             return await go_to(context, target, frame, goal.timeout, "navigate", goal.content)

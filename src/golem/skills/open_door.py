@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -18,12 +18,11 @@ from golem.options import require
 from golem.skills.base import SkillCancelled, SkillResult, StageFailed
 from golem.skills.context import Context
 from golem.skills.force_guard import CLOSED
+from golem.skills.palm_look import NEAR
+from golem.skills.planned_motion import PlannedMotion, Then
 from golem.skills.poses import moved, retracted
+from golem.skills.travel import APPROACH, blaming
 from golem.types import Array, LocalizedObject, Side
-
-if TYPE_CHECKING:
-    from golem.skills.open_door import OpenConfig
-    from golem.skills.planned_motion import PlannedMotion
 
 FRAMES = 4
 """Frames of the palm camera that tell where the handle is."""
@@ -33,8 +32,6 @@ VIEWS = ((0.0, 0.07), (0.06, 0.07), (-0.06, 0.07))
 """From how far along the closing axis, and how far back, a handle is looked for that is not seen [m]."""
 LEVEL = 0.07
 """Height above and below the grasp within which the handle is looked at [m]."""
-NEAR = 0.03
-"""How far from where it is to look from a hand may arrive [m]."""
 
 
 async def seen_before(
@@ -108,9 +105,6 @@ def _nearest(seen: LocalizedObject, position: Array) -> Array:
     level = np.abs(seen.points[:, 2] - position[2]) < LEVEL
     return np.median(seen.points[level], axis=0) if level.any() else seen.position
 
-
-if TYPE_CHECKING:
-    from golem.skills.planned_motion import PlannedMotion
 
 SPARED = 0.07
 """Radius around points of the handle within which nothing is in the hand's way [m]."""
@@ -213,7 +207,7 @@ class OpenReport:
 class OpenDoor:
     """Grasp the handle of a door and pull it open.
 
-    Stages: `detect`, `approach`, `reach`, `grasp`, `pull`, `release`, `done`.
+    Stages (see `Skill`): `detect`, `approach`, `reach`, `grasp`, `pull`, `release`, `done`.
     """
 
     Goal, Result = OpenGoal, OpenReport
@@ -223,14 +217,9 @@ class OpenDoor:
         self._report = OpenReport()
 
     def timeout(self, goal: OpenGoal) -> float:
-        """Return the time it may take [s]; see `Skill`."""
         return self._config.timeout
 
     async def run(self, context: Context, goal: OpenGoal) -> SkillResult:
-        """Open one door; see `Skill`."""
-        # Numba takes a second to import, and other skills do without it.
-        from golem.skills.planned_motion import PlannedMotion
-
         timings = {"start": context.t}
         self._report = OpenReport()
         motion, home = PlannedMotion(context), context.commanded_joints.copy()
@@ -307,9 +296,6 @@ class OpenDoor:
         self, context: Context, motion: PlannedMotion, whole: Array, handle: LocalizedObject, door: Door, side: Side
     ) -> Grasp:
         """Bring the open hand before the handle; returns the grasp that it can go on to."""
-        from golem.skills.planned_motion import Then
-        from golem.skills.travel import APPROACH, blaming
-
         method = context.grasp_method()
         motion.look([(point, SPARED) for point in spaced(whole, EVERY)])
         speed = self._config.travel_speed
@@ -337,8 +323,6 @@ class OpenDoor:
             raise refused
 
     async def _grasp(self, context: Context, motion: PlannedMotion, grasp: Grasp, side: Side) -> None:
-        from golem.skills.travel import APPROACH, blaming
-
         arm, hand = context.arms[side], context.hands[side]
         context.say("reach", "Straight to the handle.")
         with blaming("reach"):

@@ -60,8 +60,7 @@ class SeenFasteners:
 async def see_edge(context: Context) -> NearEdge:
     """Return the near edge of the pack, in base_link. The robot has to stand still.
 
-    Raises:
-        StageFailed: there is none, or no scan.
+    Raises StageFailed: there is none, or no scan.
     """
     news, points, heights = News(context.bus, topics.SCAN), list[Array](), list[Array]()
     end = context.t + LOOK

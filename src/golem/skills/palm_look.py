@@ -159,14 +159,12 @@ class PalmLook:
 
         It looks again from where it saw the thing, until that is where it was expected. The way keeps its angle to the
         surface as this hand sees it. Where the palm camera does not show the thing, all is what the head camera saw.
+        Raises PlanRefused: the hand cannot be brought there.
 
         Args:
             target: as the head camera saw it.
             way: (3,) direction along which the hand is to come.
             yaw: heading of its x axis [rad]; see `Gripper`.
-
-        Raises:
-            PlanRefused: the hand cannot be brought there.
         """
         c, context = self._config, self._context
         scene, seen_way = context.scene("head"), way
@@ -196,15 +194,12 @@ class PalmLook:
     async def before(self, target: LocalizedObject, scene: Array, grasp: Grasp) -> tuple[Grasp, View]:
         """Return the grasp of a hand that is before it, and what it sees of the thing, on its way to it.
 
-        It looks where it is, and nearer.
+        It looks where it is, and nearer. Raises PlanRefused: the hand cannot go on to it.
 
         Args:
             target: as the grasp was proposed on it.
             scene: (n, 3) points around it, from the same look.
             grasp: where the hand is about to go.
-
-        Raises:
-            PlanRefused: the hand cannot go on to it.
         """
         c, view = self._config, View(target.points, scene)
         axis = grasp.T_odom_gripper[:3, 2]

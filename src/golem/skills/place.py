@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from itertools import product
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from golem.capabilities.arms.postures import posture
 from golem.capabilities.grasping.object_cloud import MIN_POINTS
 from golem.capabilities.planning.base import Held, PlanRefused
+from golem.capabilities.planning.rules import HandUpright, Rule
 from golem.errors import ConfigError
 from golem.interfaces.payloads import GripState
 from golem.options import require
@@ -20,13 +21,11 @@ from golem.robots.model.magpie_model import MAX_GAP
 from golem.skills.base import SkillCancelled, SkillResult, StageFailed
 from golem.skills.context import Context
 from golem.skills.force_guard import ForceGuard, close_hand
+from golem.skills.planned_motion import PlannedMotion, Then
 from golem.skills.poses import at_height, head_off, lifted, retracted
+from golem.skills.travel import APPROACH, OVER, blaming
 from golem.skills.ware_sight import surface_below
 from golem.types import SIDES, Array, Side
-
-if TYPE_CHECKING:
-    from golem.capabilities.planning.rules import Rule
-    from golem.skills.planned_motion import PlannedMotion
 
 TURNS = (0.0, 0.35, -0.35, 0.7, -0.7, 1.05, -1.05)
 """Turns about the vertical in which the hand may set down, in this order [rad]."""
@@ -161,7 +160,8 @@ class PlaceReport:
 class SetDown:
     """Set down what a hand holds, upright, on the surface at a place.
 
-    Stages: `detect`, `carry`, `lower`, `release`, `done`. What is held stays held where it fails before `release`.
+    Stages (see `Skill`): `detect`, `carry`, `lower`, `release`, `done`. Where it fails before `release`, what is held
+    stays held.
     """
 
     Goal, Result = PlaceGoal, PlaceReport
@@ -172,14 +172,9 @@ class SetDown:
         self._off = np.zeros(3)
 
     def timeout(self, goal: PlaceGoal) -> float:
-        """Return the time it may take [s]; see `Skill`."""
         return self._config.timeout
 
     async def run(self, context: Context, goal: PlaceGoal) -> SkillResult:
-        """Set one thing down; see `Skill`."""
-        # Numba takes a second to import, and other skills do without it.
-        from golem.skills.planned_motion import PlannedMotion
-
         start, motion = context.t, PlannedMotion(context)
         try:
             side = self._holder(context, goal)
@@ -247,9 +242,6 @@ class SetDown:
 
     async def _carry(self, context: Context, motion: PlannedMotion, goal: PlaceGoal, side: Side, spot: Array) -> None:
         """Bring the hand above the place, what it holds upright."""
-        from golem.skills.planned_motion import Then
-        from golem.skills.travel import APPROACH, OVER, blaming
-
         c, arm = self._config, context.arms[side]
         below = goal.below or c.unknown
         held = Held(side, _column(arm.pose, below, goal.above))
@@ -311,8 +303,6 @@ class SetDown:
 
     def _upright(self, context: Context, side: Side) -> list[Rule]:
         """Return the rule that what is held does not lean: a hand that came from above goes on looking down."""
-        from golem.capabilities.planning.rules import HandUpright
-
         z = context.arms[side].commanded[:3, 2]
         lean = math.acos(min(-float(z[2]), 1.0)) if z[2] < 0.0 else math.pi
         return [HandUpright(side, TILT + lean)] if lean < LEANS else []

@@ -248,13 +248,10 @@ class PlannedMotion:
         held: Sequence[Held],
         near: float,
     ) -> Array:
-        """Return (k, 15) postures to plan to, from which the lines can be gone.
+        """Return (k, 15) postures to plan to, from which the lines can be gone. Raises PlanRefused: there is none.
 
         The first choice is the posture in which the arm's own controller would arrive: it is the one that later
         motions along palm targets need not leave.
-
-        Raises:
-            PlanRefused: there is none.
         """
         space = JointSpace(self._robot, q, world, rules, held)
         itself = JointSpace(self._robot, q, held=held)

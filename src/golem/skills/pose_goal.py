@@ -61,10 +61,8 @@ async def go_to(
 
     Within `content` [m] of it, and `TURNED`, the robot stands at once; 0 leaves that to the navigator.
 
-    Feedback about once a second with the data `left` [x, y, yaw] as seen from the robot.
-
-    Raises:
-        StageFailed: it did not get there, in `stage`; names the module that could not.
+    Feedback about once a second with the data `left` [x, y, yaw] as seen from the robot. Raises StageFailed: it did not
+    get there, in `stage`; names the module that could not.
     """
     start, said = context.t, -math.inf
     with context.navigate(target, frame) as way:

@@ -12,14 +12,11 @@ from golem.types import Array
 
 
 def floor_places(what: str, numbers: Sequence[float]) -> Array:
-    """Return (n, 2) the places that `numbers` name.
+    """Return (n, 2) the places that `numbers` name. Raises ConfigError: they are no pairs, or not finite.
 
     Args:
         what: which goal has them, for the error.
         numbers: x, y of each [m].
-
-    Raises:
-        ConfigError: they are no pairs, or not finite.
     """
     if len(numbers) % 2 or not all(map(math.isfinite, numbers)):
         raise ConfigError(f"The places of {what} are pairs of finite numbers, x and y of each place.")

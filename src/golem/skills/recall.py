@@ -120,18 +120,16 @@ class RecallGoal:
 class Recall:
     """Say where something is or was, by what the robot remembers; nothing moves.
 
-    Stages: `done`. That nothing is remembered is an answer, too.
+    Stages (see `Skill`): `done`. That nothing is remembered is an answer, too.
     """
 
     Goal = RecallGoal
     Result = RecalledPlaces
 
     def timeout(self, goal: RecallGoal) -> float:
-        """Return the time it may take [s]; see `Skill`."""
         return MARGIN
 
     async def run(self, context: Context, goal: RecallGoal) -> SkillResult:
-        """Ask; see `Skill`."""
         found = await ask(context, goal.text, goal.when, goal.ago, goal.limit)
         text = sentence(found) if found.places else f"Nothing is remembered of '{goal.text}'."
         context.say("done", text)

@@ -42,18 +42,16 @@ class RememberGoal:
 class Remember:
     """Look for things with one camera, and remember where they are; nothing moves.
 
-    Stages: `look`, `done`. What is there is looked for by every skill that looks; this one does nothing else.
+    Stages (see `Skill`): `look`, `done`. Every skill that looks has things remembered; this one does nothing else.
     """
 
     Goal = RememberGoal
     Result = RecalledPlaces
 
     def timeout(self, goal: RememberGoal) -> float:
-        """Return the time it may take [s]; see `Skill`."""
         return goal.seconds + MARGIN
 
     async def run(self, context: Context, goal: RememberGoal) -> SkillResult:
-        """Look; see `Skill`."""
         before = (await memory_status(context)).looks
         context.say("look", f"Looking for {', '.join(goal.labels)}.")
         with context.watch(goal.camera, *goal.labels):

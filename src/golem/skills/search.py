@@ -14,6 +14,7 @@ from golem.interfaces import topics
 from golem.options import require
 from golem.skills.base import SkillResult
 from golem.skills.context import Context
+from golem.skills.explore import LOOK, RADIUS
 from golem.skills.fetch import STAGE, TURN, before
 from golem.skills.navigate import NavigateGoal
 from golem.skills.pose_goal import FIRST_REPORT
@@ -21,12 +22,8 @@ from golem.skills.recall import RecalledPlaces, ask
 from golem.skills.remember import RememberGoal
 from golem.types import PlanarPose
 
-LOOK = 1.5
-"""Time of a look [s]."""
 AGO = 5.0
 """Age up to which a sighting is of the look just made [s]."""
-ROOM = 0.55
-"""Distance that the robot keeps from obstacles at a frontier [m]: see `explore`."""
 GIVEN_UP = 0.5
 """Places nearer than this to one that was looked at from are not gone to again [m]."""
 ANYTHING = 50
@@ -54,17 +51,15 @@ class SearchGoal:
 class Search:
     """Find a thing: look where it was, then where such things were, then where the map ends.
 
-    Stages: `look`, those of `navigate`, `done`. Legs that do not walk look from where they are.
+    Stages (see `Skill`): `look`, those of `navigate`, `done`. Legs that do not walk look from where they are.
     """
 
     Goal, Result = SearchGoal, RecalledPlaces
 
     def timeout(self, goal: SearchGoal) -> float:
-        """Return the time it may take [s]; see `Skill`."""
         return 60.0 + 90.0 * goal.places
 
     async def run(self, context: Context, goal: SearchGoal) -> SkillResult:
-        """Search; see `Skill`."""
         await context.until(lambda: context.legs.reporting, FIRST_REPORT)
         walks, gone = context.legs.status.speed > 0.0, list[PlanarPose]()
         while True:
@@ -104,7 +99,7 @@ class Search:
         grid = context.bus.latest(topics.MAP)
         if grid is not None and mapped:
             local = context.T_odom_map.to(here)
-            targets += [context.T_odom_map @ each.pose for each in frontiers(grid.in_map, ROOM, local)]
+            targets += [context.T_odom_map @ each.pose for each in frontiers(grid.in_map, RADIUS, local)]
         if not targets:
             targets = [here @ PlanarPose(0.0, 0.0, TURN * turn) for turn in (1, -1)]
         for target in targets:

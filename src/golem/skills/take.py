@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,13 +20,13 @@ from golem.robots.model.magpie_model import MAX_GAP
 from golem.skills.base import SkillCancelled, SkillResult, StageFailed
 from golem.skills.context import Context
 from golem.skills.force_guard import close_hand
+from golem.skills.palm_look import PalmLook
+from golem.skills.planned_motion import PlannedMotion, Then
 from golem.skills.poses import lifted, retracted, share_off
 from golem.skills.take_config import TakeGoal, TakeReport, TakeThingConfig
+from golem.skills.travel import APPROACH, blaming
 from golem.skills.ware_sight import find, surface_below
 from golem.types import SIDES, Array, LocalizedObject, Side
-
-if TYPE_CHECKING:
-    from golem.skills.planned_motion import PlannedMotion
 
 
 def reached_first(context: Context, side: Side, grasps: Sequence[Grasp], before: float) -> list[Grasp]:
@@ -67,7 +66,7 @@ TOP, FORWARD = "top", "forward"
 class Take:
     """Grasp a thing by its name where it stands, lift it, and hold it.
 
-    Stages: `detect`, `approach`, `reach`, `grasp`, `lift`, `done`.
+    Stages (see `Skill`): `detect`, `approach`, `reach`, `grasp`, `lift`, `done`.
 
     Attributes:
         force: what each finger is told to press with [N].
@@ -81,14 +80,9 @@ class Take:
         self.force = self._config.force
 
     def timeout(self, goal: TakeGoal) -> float:
-        """Return the time it may take [s]; see `Skill`."""
         return self._config.timeout
 
     async def run(self, context: Context, goal: TakeGoal) -> SkillResult:
-        """Take one thing; see `Skill`."""
-        # Numba takes a second to import, and other skills do without it.
-        from golem.skills.planned_motion import PlannedMotion
-
         start, motion, home = context.t, PlannedMotion(context), context.commanded_joints.copy()
         timings: dict[str, float] = {}
         side: Side | None = None
@@ -201,9 +195,6 @@ class Take:
         kind: str,
     ) -> Grasp:
         """Bring one hand before the thing along one approach, look again, and return the grasp to go on to."""
-        from golem.skills.palm_look import PalmLook
-        from golem.skills.travel import blaming
-
         c, way = self._config, self._way(context, target, kind)
         yaw = context.heading + (0.5 * math.pi if side == "left" else -0.5 * math.pi)
         self._report.side, self._report.approach = side, kind
@@ -244,9 +235,6 @@ class Take:
 
         Those that the arm alone reaches from where it is are tried first: a planner takes longer to refuse.
         """
-        from golem.skills.planned_motion import Then
-        from golem.skills.travel import APPROACH, blaming
-
         c, refused = self._config, list[PlanRefused]()
         for grasp in reached_first(context, side, grasps, c.before)[: c.attempts]:
             T = grasp.T_odom_gripper
@@ -283,8 +271,6 @@ class Take:
             self._report.aside_y = 0.0
 
     async def _grasp(self, context: Context, motion: PlannedMotion, side: Side, grasp: Grasp) -> None:
-        from golem.skills.travel import APPROACH, blaming
-
         c, arm, hand = self._config, context.arms[side], context.hands[side]
         hand.open(min(grasp.gap + SPARE, MAX_GAP))
         context.say("reach", "Straight to it.", side=side, target=grasp.T_odom_gripper[:3, 3].tolist())

@@ -12,6 +12,7 @@ from golem.capabilities.arms.postures import posture
 from golem.capabilities.planning.base import Held, PlanRefused, Refusal
 from golem.skills.base import StageFailed
 from golem.skills.context import Context
+from golem.skills.planned_motion import SCREW, PlannedMotion, Then
 from golem.skills.poses import at_height, lifted
 from golem.types import SIDES, Array, Side
 
@@ -69,8 +70,7 @@ class Travel(Protocol):
     ) -> None:
         """Go straight to a pose; ends early once `stop()` is true.
 
-        Raises:
-            StageFailed: the hand cannot keep to the line; it has not moved, and `stage` is what failed.
+        Raises StageFailed: the hand cannot keep to the line; it has not moved, and `stage` is what failed.
         """
         ...
 
@@ -80,7 +80,7 @@ class Travel(Protocol):
 
 
 class LineTravel:
-    """Up to a height, across, and down, blind to what is in the way."""
+    """Up to a height, across, and down, blind to what is in the way; carries to the first goal. See `Travel`."""
 
     def __init__(self, context: Context, height: float, tolerance: float) -> None:
         """Remember where the hands are, which move across above `height` in odom and arrive within `tolerance` [m]."""
@@ -97,21 +97,17 @@ class LineTravel:
         """Nothing was seen."""
 
     async def over(self, side: Side, T_object: Array, clearance: float, share: float, speed: float) -> None:
-        """Go up, across and down; see `Travel`."""
         await self._go(side, lifted(T_object, clearance), speed)
 
     async def carry(self, side: Side, goals: Sequence[Array], speed: float) -> None:
-        """Go up, across and down to the first; see `Travel`."""
         await self._go(side, goals[0], speed)
 
     async def line(
         self, side: Side, T_goal: Array, speed: float, stage: str, stop: Callable[[], bool] = _never
     ) -> None:
-        """Go, unchecked; see `Travel`."""
         await self._context.arms[side].move(T_goal, speed, stop=stop)
 
     async def home(self, side: Side, speed: float) -> None:
-        """Go up, across and down; see `Travel`."""
         await self._go(side, self._homes[side], speed)
 
     async def _go(self, side: Side, T_goal: Array, speed: float) -> None:
@@ -124,13 +120,10 @@ class LineTravel:
 
 
 class PlannedTravel:
-    """Around what the head camera shows, with lines that are checked before the hand moves."""
+    """Around what the head camera shows, with lines that are checked before the hand moves; see `Travel`."""
 
     def __init__(self, context: Context, lines: LineTravel, tolerance: float) -> None:
         """Remember where the arms are; they arrive within `tolerance` [m], without a planned way home by `lines`."""
-        # Numba takes a second to import, and lines do without it.
-        from golem.skills.planned_motion import PlannedMotion
-
         self._context, self._lines, self._tolerance = context, lines, tolerance
         self._motion = PlannedMotion(context)
         self._home = context.commanded_joints.copy()
@@ -150,25 +143,18 @@ class PlannedTravel:
         self._home = home
 
     def look(self, targets: Sequence[Array]) -> None:
-        """Take the head camera's cloud for the world; see `Travel`."""
         self._motion.look([(target, SPARED) for target in targets])
 
     def displace(self, by: Array) -> None:
-        """Move the cloud; see `Travel`."""
         self._motion.displace(by)
 
     async def over(self, side: Side, T_object: Array, clearance: float, share: float, speed: float) -> None:
-        """Go there in a posture from which the way down is straight; see `Travel`."""
-        from golem.skills.planned_motion import Then
-
         end = lifted(T_object, (1.0 - share) * clearance)
         then = [Then(side, end, speed, APPROACH)] if share else []
         await self._to("approach", side, lifted(T_object, clearance), speed, then=then, near=OVER)
 
     async def carry(self, side: Side, goals: Sequence[Array], speed: float) -> None:
         """Go around what is in the way of the hand and of the screw; see `Travel`."""
-        from golem.skills.planned_motion import SCREW
-
         for i, T in enumerate(goals, start=1):
             try:
                 return await self._to("place", side, T, speed, held=[Held(side, SCREW)], near=OVER)
@@ -179,7 +165,6 @@ class PlannedTravel:
     async def line(
         self, side: Side, T_goal: Array, speed: float, stage: str, stop: Callable[[], bool] = _never
     ) -> None:
-        """Go if the hand can keep to the line; see `Travel`."""
         with blaming(stage):
             await self._motion.line(side, T_goal, speed, stop, PULL)
 

@@ -9,10 +9,8 @@ from typing import Literal
 from golem.options import require
 from golem.skills.base import SkillResult
 from golem.skills.context import Context
-from golem.skills.pose_goal import FIRST_REPORT, MARGIN, check_numbers, check_reach, go_to
-from golem.types import PlanarPose, Twist
-
-ZERO = Twist()
+from golem.skills.pose_goal import FIRST_REPORT, MARGIN, ZERO, check_numbers, check_reach, go_to
+from golem.types import PlanarPose
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,17 +36,15 @@ class WalkGoal:
 class Walk:
     """Walk to a pose on the floor and stand there.
 
-    Stages: `walk`, `done`; feedback about once a second with the data `left` [x, y, yaw] as seen from the robot.
+    Stages (see `Skill`): `walk`, `done`; feedback about once a second with the data `left` [x, y, yaw] from the robot.
     """
 
     Goal = WalkGoal
 
     def timeout(self, goal: WalkGoal) -> float:
-        """Return the time it may take [s]; see `Skill`."""
         return goal.timeout + MARGIN
 
     async def run(self, context: Context, goal: WalkGoal) -> SkillResult:
-        """Walk to one pose; see `Skill`."""
         # Of a robot that was built a moment ago they do so at its first tick.
         await context.until(lambda: context.legs.reporting, FIRST_REPORT)
         target = PlanarPose(goal.x, goal.y, goal.yaw)
