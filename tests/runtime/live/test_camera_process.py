@@ -13,7 +13,7 @@ from golem.middleware.dds.local import LocalDomain
 from golem.middleware.ros.msgs.rosgraph_msgs import Clock
 from golem.middleware.ros.node import RosNode
 from golem.robots.sensors.cameras import HEAD
-from golem.runtime.live.device_process import CameraProcess
+from golem.runtime.live.device_process import CameraProcess, DriverPlace
 
 
 class Source:
@@ -32,7 +32,8 @@ def test_images_bear_the_robots_time_and_faults_are_said() -> None:
     domain = LocalDomain()
     here, there = domain.participant(), domain.participant()
     listener, source, lines, now = RosNode(there, "listener"), Source(), list[str](), 1000.0
-    process = CameraProcess(here, RosNode(here, "camera"), "head", source, lambda: now, lines.append)
+    place = DriverPlace(here, RosNode(here, "camera"), lambda: now, lines.append)
+    process = CameraProcess(place, "head", source)
     heard: dict[str, list[Any]] = {what: [] for what in (public.COLOR, public.DEPTH, public.CAMERA_INFO)}
     for what, messages in heard.items():
         row = public.topic(public.image("head", what))

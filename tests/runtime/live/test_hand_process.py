@@ -13,7 +13,7 @@ from golem.interfaces import public, ros_convert
 from golem.middleware.dds.local import LocalDomain
 from golem.middleware.ros.msgs.rosgraph_msgs import Clock
 from golem.middleware.ros.node import RosNode
-from golem.runtime.live.device_process import HandProcess
+from golem.runtime.live.device_process import DriverPlace, HandProcess
 from golem.types import SIDES, TICK, HandCommand, HandState, Side
 
 ROBOT_TIME = 50.0
@@ -42,7 +42,7 @@ class Rig:
             side: MagpieServos(MagpieServoConfig(bus.line.name), bus.connect) for side, bus in self.buses.items()
         }
         node = RosNode(here, "hands")
-        self.process = HandProcess(here, node, self.drivers, lambda: self.now, self.told.append)
+        self.process = HandProcess(DriverPlace(here, node, lambda: self.now, self.told.append), self.drivers)
         row = public.topic("/clock")
         self.clock = self.stack.publisher(row.name, row.type, row.qos)
         self.commands = {}

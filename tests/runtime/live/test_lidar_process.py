@@ -15,7 +15,7 @@ from golem.interfaces.images import to_points
 from golem.middleware.dds.local import LocalDomain
 from golem.middleware.ros.msgs.rosgraph_msgs import Clock
 from golem.middleware.ros.node import RosNode
-from golem.runtime.live.device_process import CLOUD, IMU, LidarProcess
+from golem.runtime.live.device_process import CLOUD, IMU, DriverPlace, LidarProcess
 
 BEGIN, ROBOT_TIME = 1000.0, 50.0
 """What our clock and the robot's show when the LiDAR begins."""
@@ -33,7 +33,8 @@ class Rig:
         self.lidar = Mid360("127.0.0.1", point_port=0, imu_port=0)
         self.peer = Mid360Peer(self.lidar.ports)
         self.listener = RosNode(there, "listener")
-        self.process = LidarProcess(here, RosNode(here, "lidar"), self.lidar, lambda: self.now, self.lines.append)
+        place = DriverPlace(here, RosNode(here, "lidar"), lambda: self.now, self.lines.append)
+        self.process = LidarProcess(place, self.lidar)
         row = public.topic("/clock")
         self.clock = self.listener.publisher(row.name, row.type, row.qos)
         self.heard: dict[str, list[Any]] = {CLOUD: [], IMU: []}

@@ -114,21 +114,24 @@ class Measurement(NamedTuple):
     encode: Callable[[Any], Any] | None = None
 
 
+@dataclass(frozen=True)
+class DriverPlace:
+    """Where a driver runs: it is a member of a domain, stamps by `clock` [s], and `tell` says a line to a person."""
+
+    participant: Participant
+    node: RosNode
+    clock: Callable[[], float] = time.monotonic
+    tell: Callable[[str], None] = log_line
+
+
 class DeviceProcess(ABC):
     """A device without its loop: what it measures is sent with the robot's time, what is wrong is told once."""
 
-    def __init__(
-        self,
-        participant: Participant,
-        node: RosNode,
-        topics: Collection[str],
-        clock: Callable[[], float],
-        tell: Callable[[str], None],
-    ) -> None:
-        """Publish `topics` of the robot; the driver stamps by `clock` [s], and `tell` says a line to a person."""
-        self.clock, self.tell = clock, tell
-        self.endpoints = RoleEndpoints("robot", participant, node, topics)
-        self._robot_time = RobotTime(node, clock)
+    def __init__(self, place: DriverPlace, topics: Collection[str]) -> None:
+        """Publish `topics` of the robot."""
+        self.clock, self.tell = place.clock, place.tell
+        self.endpoints = RoleEndpoints("robot", place.participant, place.node, topics)
+        self._robot_time = RobotTime(place.node, place.clock)
         self._faults: dict[str, str] = {}
 
     def step(self) -> None:
@@ -154,22 +157,14 @@ class DeviceProcess(ABC):
 class HandProcess(DeviceProcess):
     """The hands. One that fails is named once, and reports nothing until it works again."""
 
-    def __init__(
-        self,
-        participant: Participant,
-        node: RosNode,
-        hands: Mapping[Side, MagpieServos],
-        clock: Callable[[], float] = time.monotonic,
-        tell: Callable[[str], None] = log_line,
-    ) -> None:
-        """Take commands for `hands` and send their reports; see `DeviceProcess`."""
-        super().__init__(participant, node, {public.gripper(side, "state") for side in hands}, clock, tell)
+    def __init__(self, place: DriverPlace, hands: Mapping[Side, MagpieServos]) -> None:
+        """Take commands for `hands` and send their reports."""
+        super().__init__(place, {public.gripper(side, "state") for side in hands})
         self._hands = hands
         for side in hands:
             self.endpoints.listen(public.gripper(side, "command"), hands[side].command)
 
     def measured(self, now: float) -> Iterable[Measurement]:
-        """Exchange what there is to exchange with each hand; see `DeviceProcess`."""
         for side, hand in self._hands.items():
             try:
                 report = hand.step(now)
@@ -184,18 +179,11 @@ class HandProcess(DeviceProcess):
 class LidarProcess(DeviceProcess):
     """The LiDAR. Silence is told, and what was lost, and nothing else."""
 
-    def __init__(
-        self,
-        participant: Participant,
-        node: RosNode,
-        lidar: Mid360,
-        clock: Callable[[], float] = time.monotonic,
-        tell: Callable[[str], None] = log_line,
-    ) -> None:
-        """Publish what `lidar` measures; see `DeviceProcess`."""
-        super().__init__(participant, node, (CLOUD, IMU), clock, tell)
+    def __init__(self, place: DriverPlace, lidar: Mid360) -> None:
+        """Publish what `lidar` measures."""
+        super().__init__(place, (CLOUD, IMU))
         self._lidar = lidar
-        self._heard, self._silent = clock(), False
+        self._heard, self._silent = place.clock(), False
         self._reports, self._lost = Every(REPORT), (0, 0)
 
     def measured(self, now: float) -> Iterable[Measurement]:
@@ -235,19 +223,11 @@ class ExposureSource(Protocol):
 class CameraProcess(DeviceProcess):
     """One camera."""
 
-    def __init__(
-        self,
-        participant: Participant,
-        node: RosNode,
-        name: str,
-        source: ExposureSource,
-        clock: Callable[[], float] = time.monotonic,
-        tell: Callable[[str], None] = log_line,
-    ) -> None:
-        """Publish what `source` sees as the images of the camera called `name`; see `DeviceProcess`."""
+    def __init__(self, place: DriverPlace, name: str, source: ExposureSource) -> None:
+        """Publish what `source` sees as the images of the camera called `name`."""
         self._name, self._source = name, source
         self._topics = [public.image(name, what) for what in public.IMAGES]
-        super().__init__(participant, node, self._topics, clock, tell)
+        super().__init__(place, self._topics)
 
     def measured(self, now: float) -> Iterable[Measurement]:
         exposure = self._source.step()
@@ -294,10 +274,10 @@ def run_camera(config: CameraConfig) -> None:
     _drive(f"camera_{name}", config.dds, words, partial(CameraProcess, name=name, source=camera))
 
 
-def _drive(name: str, dds: DdsConfig, words: str, make: Callable[..., DeviceProcess]) -> None:
+def _drive(name: str, dds: DdsConfig, words: str, make: Callable[[DriverPlace], DeviceProcess]) -> None:
     """Join the domain as `name`, say `words`, and run the process that `make` returns until Ctrl-C."""
     with interrupted() as stop, closing(AsyncLogger()) as tell, member(name, dds, tell) as (participant, node):
-        process = make(participant, node, tell=tell)
+        process = make(DriverPlace(participant, node, tell=tell))
         tell(words)
         while not stop.wait(TICK):
             process.step()
