@@ -183,7 +183,7 @@ class Inspected:
         self.running.executor.run(0.2)
         assert self.run.result is None
         coroutine = self.run._coroutine
-        self.roots += [("context", self.running._stack.context), ("coroutine", coroutine), ("bus", self.running.bus)]
+        self.roots += [("context", self.running.context), ("coroutine", coroutine), ("bus", self.running.bus)]
 
     def module(self, slot: str) -> Any:
         return next(module for name, module in self.roots if name == slot)

@@ -240,7 +240,7 @@ def test_options_of_the_base_layer_reach_it() -> None:
     parts = {"locomotion": {"trim": False, "timeout": 0.2}}
     running, twin = build(Stack(parts=parts, profile="ideal"), seed=0)
     twin.close()
-    config = running._stack.legs._locomotion.config
+    config = running.legs._locomotion.config
     assert config == LocomotionConfig(trim=None, timeout=0.2)
 
 

@@ -29,7 +29,7 @@ def run(
     running, robot = build(Stack(profile="bench").with_choice("localizer", BLIND), 0)
     try:
         running.executor.run(1.0)
-        arms = running._stack.context.arms
+        arms = running.context.arms
         before = np.array([arms[side].pose[:3, 3] for side in ("left", "right")])
         with policy_server(answer) as port:
             from golem.capabilities.policies.openpi import PolicyLinkConfig

@@ -32,7 +32,7 @@ class Cockpit:
 
     def until(self, t: float, say: Callable[[float], Any] = lambda t: None, side: str = "right") -> None:
         """Let time pass, and keep where the hand is and is sent, in base_link, 100 times a second."""
-        arm = self.running._stack.context.arms["right" if side == "right" else "left"]
+        arm = self.running.context.arms["right" if side == "right" else "left"]
 
         def over() -> bool:
             now = self.running.executor.t
@@ -137,9 +137,9 @@ def test_hands_close_and_open(cockpit: Cockpit) -> None:
 def test_the_waist_turns_and_the_hand_stays(cockpit: Cockpit) -> None:
     cockpit.until(1.2, lambda t: DOWN)
     cockpit.until(1.6, lambda t: {"hold": True})
-    start, turned = cockpit.hand, cockpit.running._stack.context.joints[0]
+    start, turned = cockpit.hand, cockpit.running.context.joints[0]
     cockpit.until(4.0, lambda t: {"hold": True, "waist": 0.5})
-    assert cockpit.running._stack.context.joints[0] - turned > 0.1
+    assert cockpit.running.context.joints[0] - turned > 0.1
     assert np.linalg.norm(cockpit.hand - start) < 2.0 * SWAY
 
 
@@ -150,10 +150,10 @@ def test_a_standing_robot_walks_and_stands_when_let_go(walker: tuple[LockstepRun
     begun = running.executor.t
     cockpit = Cockpit(running)
     cockpit.until(begun + 1.0)
-    x = running._stack.context.T_odom_base[0, 3]
+    x = running.context.T_odom_base[0, 3]
     cockpit.until(begun + 4.0, lambda t: {"hold": True, "twist": [1.0, 0.0, 0.0]})
-    assert running._stack.context.T_odom_base[0, 3] - x > 0.3
+    assert running.context.T_odom_base[0, 3] - x > 0.3
     cockpit.until(begun + 6.0)
-    there = running._stack.context.T_odom_base[:2, 3].copy()
+    there = running.context.T_odom_base[:2, 3].copy()
     cockpit.until(begun + 7.0)
-    assert np.linalg.norm(running._stack.context.T_odom_base[:2, 3] - there) < 0.05
+    assert np.linalg.norm(running.context.T_odom_base[:2, 3] - there) < 0.05

@@ -28,7 +28,7 @@ def drive(
 ) -> None:
     """Let `script(teleop)` drive from a thread of its own, up to a robot time."""
     thread = threading.Thread(target=script, args=(teleop,), daemon=True)
-    watch, arm = teleop.watch, running._stack.context.arms["right"]
+    watch, arm = teleop.watch, running.context.arms["right"]
 
     def both() -> None:
         watch()

@@ -11,32 +11,27 @@ import numpy as np
 
 from golem import registry
 from golem.capabilities.arms.postures import POSTURES
-from golem.capabilities.legs.base import Envelope
 from golem.capabilities.legs.hold import STANCES
 from golem.errors import ConfigError, ModuleFault, RobotGone
 from golem.hardware.estop.estop_config import VirtualEstop
 from golem.hardware.safety.base import OperatorRequest, SafetyLimits
-from golem.interfaces.payloads import GateStatus
 from golem.middleware.bus import Bus
 from golem.robots.base import HasGantry, HasLivingSensors, Robot
 from golem.robots.sensors.profiles import load_profile
 from golem.runtime.chain import chain_of
-from golem.runtime.checked import CheckedMemory
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.executor import FOREVER, Executor, in_order, when_stepped
 from golem.runtime.node_groups import RobotNodes, SafetyNodes, StackNodes, hears_lidar
 from golem.runtime.perception_nodes import LATENCY, detection_requested
-from golem.runtime.skill_table import SkillTable
 from golem.runtime.standing_legs import StandingLegs
 from golem.skills.base import Routine, SkillResult
 from golem.skills.context import Context
-from golem.skills.runner import SkillRun
 from golem.stack import Stack
-from golem.types import LEGS, NUM_JOINTS, UPPER, Array, Side
+from golem.types import LEGS, NUM_JOINTS, UPPER, Array
 
 
-class LockstepRunner:
-    """A stack in execution; `estop` is the virtual emergency stop, to be pressed."""
+class LockstepRunner(StackNodes):
+    """A stack in execution, with its robot and gate; `estop` is the virtual emergency stop, to be pressed."""
 
     def __init__(self, stack: Stack, robot: Robot, limits: SafetyLimits | None = None) -> None:
         """Wire the modules of `stack` to `robot`.
@@ -53,72 +48,32 @@ class LockstepRunner:
                 "A board as emergency stop is for 'golem launch' and 'golem safety'; "
                 "in lock-step estop.use is 'virtual'."
             )
-        self.stack = stack
-        self.bus = Bus()
-        self.estop = VirtualEstop()
+        bus, self.estop = Bus(), VirtualEstop()
         gantry = robot if isinstance(robot, HasGantry) and robot.on_gantry else None
         lidar = hears_lidar(stack)
-        seen = partial(detection_requested, self.bus)
+        seen = partial(detection_requested, bus)
         calibration = stack.part("calibration").load()
         offset = calibration.joint_offset if calibration.joint_offset.any() else None
-        self._robot = RobotNodes(self.bus, stack, robot, seen, (lambda: True) if lidar else None, offset)
+        self._robot = RobotNodes(bus, stack, robot, seen, (lambda: True) if lidar else None, offset)
         limits = limits or SafetyLimits.from_profile(stack.limits)
         if not isinstance(robot, HasLivingSensors):
             limits = limits.believing()
         elif not robot.living:
             limits = limits.still()
         standing = StandingLegs if stack.on_ground else None
-        self._safety = SafetyNodes(self.bus, limits, self.estop, standing)
-        cameras = calibration.merged(robot.calibration)
-        self._stack = StackNodes(self.bus, stack, cameras, calibration.mount, gantry, LATENCY)
-        ordered = in_order(self._robot.nodes + self._safety.nodes + self._stack.nodes)
-        self.executor = Executor(self.bus, ordered, chain=chain_of(self.bus, ordered))
+        self._safety = SafetyNodes(bus, limits, self.estop, standing)
+        super().__init__(bus, stack, calibration.merged(robot.calibration), calibration.mount, gantry, LATENCY)
+        ordered = in_order(self._robot.nodes + self._safety.nodes + self.nodes)
+        self.executor = Executor(bus, ordered, chain=chain_of(bus, ordered))
         self.request(OperatorRequest.ACTIVATE)
-
-    @property
-    def skills(self) -> SkillTable:
-        """The skills of the stack."""
-        return self._stack.skills
-
-    @property
-    def memory(self) -> CheckedMemory:
-        """What the stack remembers."""
-        return self._stack.memory
-
-    @property
-    def safety(self) -> GateStatus | None:
-        """The newest verdict of the safety gate."""
-        return self._stack.safety
-
-    @property
-    def envelope(self) -> Envelope:
-        """The twists that the leg controller in charge can follow."""
-        return self._stack.envelope
 
     def sleep(self, seconds: float) -> None:
         """Let time pass for the memory alone: a day, as if the robot had been off."""
-        self._stack.remembering.sleep(seconds, self.executor.t)
+        self.remembering.sleep(seconds, self.executor.t)
 
     def request(self, request: OperatorRequest) -> None:
         """Ask something of the safety gate as an operator does: activate, stop, reset; it decides."""
         self._safety.request(request)
-
-    def start(self, skill: str | Routine[Context, Any], goal: object, timeout: float | None = None) -> SkillRun:
-        """Start a skill; see `StackNodes.start`."""
-        return self._stack.start(skill, goal, timeout)
-
-    @property
-    def busy(self) -> bool:
-        """Whether a skill is running; one that was cancelled may still be leaving the robot safe."""
-        return self._stack.busy
-
-    def cancel(self) -> None:
-        """Cancel the skill that runs; see `StackNodes.cancel`."""
-        self._stack.cancel()
-
-    def commanded(self, side: Side) -> Array:
-        """Return the (4, 4) pose in odom that the hand on `side` is being sent to."""
-        return self._stack.commanded(side)
 
     def execute(
         self,
@@ -144,13 +99,13 @@ class LockstepRunner:
             this returns.
         """
         run = self.start(skill, goal, timeout)
-        self._stack.legs.realtime = realtime
+        self.legs.realtime = realtime
 
         def over() -> bool:
             if watch is not None:
                 watch()
-            ended = run.result is not None and not self._stack.legs.recovering(self.executor.t)
-            return ended or self._stack.stopped
+            ended = run.result is not None and not self.legs.recovering(self.executor.t)
+            return ended or self.stopped
 
         try:
             due = when_stepped if watch is None else getattr(watch, "due", None)
