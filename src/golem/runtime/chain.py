@@ -44,7 +44,7 @@ class Link:
 
 
 @runtime_checkable
-class HasLink(Protocol):
+class HasLink(Node, Protocol):
     """A node that may take part in the chain."""
 
     def link(self) -> Link | None:

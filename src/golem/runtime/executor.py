@@ -147,10 +147,8 @@ class Executor:
     def __init__(self, bus: Bus, nodes: Sequence[Node], start: float = 0.0, chain: Chain | None = None) -> None:
         """Schedule `nodes`, which exchange messages over `bus`. Raises ConfigError: a node is faster than the clock.
 
-        Args:
-            nodes: in the order of their turns.
-            start: a time that is to be a tick [s]; a clock from outside need not start at a multiple of one.
-            chain: some of the nodes, which then run as a chain.
+        They are in the order of their turns; those of `chain` run as one. A tick is to be at `start` [s]: a clock from
+        outside need not start at a multiple of one.
         """
         self._bus, self._chain = bus, chain
         links = {} if chain is None else {id(node): i for i, node in enumerate(chain.members)}
@@ -200,11 +198,7 @@ class Executor:
         self._tick += 1
 
     def _quiet_ticks(self, until: float) -> int:
-        """Return for how many ticks from the present one on nobody but the chain has a turn.
-
-        Args:
-            until: when somebody who looks on wants to be asked [s]: the time after the last of them is not later.
-        """
+        """Return for how many ticks from the present one on nobody but the chain has a turn, none after `until` [s]."""
         t = self.t
         came = self._bus.deliver(t, () if self._chain is None else self._chain.hears)
         due = _NEVER

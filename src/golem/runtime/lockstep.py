@@ -34,14 +34,9 @@ class LockstepRunner(StackNodes):
     """A stack in execution, with its robot and gate; `estop` is the virtual emergency stop, to be pressed."""
 
     def __init__(self, stack: Stack, robot: Robot, limits: SafetyLimits | None = None) -> None:
-        """Wire the modules of `stack` to `robot`.
+        """Wire the modules of `stack` to `robot`. Raises ConfigError, ModuleFault: see `StackNodes`.
 
-        Args:
-            limits: what the safety gate enforces instead of the stack's profile: for studies of the gate.
-
-        Raises:
-            ConfigError: a name or an option of the stack is wrong.
-            ModuleFault: a module's constructor raised, or the module lacks a part of its contract.
+        What the safety gate enforces instead of the stack's profile, in studies of the gate, are `limits`.
         """
         if stack.part("estop").use != "virtual":
             raise ConfigError(

@@ -13,6 +13,7 @@ from golem.interfaces import topics
 from golem.interfaces.payloads import LegCommand, LegStatus, ModuleFaultMsg
 from golem.middleware.bus import Bus, News
 from golem.runtime.contract_check import ContractCheck
+from golem.runtime.executor import Node
 from golem.runtime.nodes import MIN_RATE, moving
 from golem.types import LEGS, BaseEstimate, LowState, Twist
 
@@ -63,7 +64,7 @@ class CheckedLowerBody:
         return checked
 
 
-class LowerBodyNode:
+class LowerBodyNode(Node):
     """Runs the leg controller at its rate; when it fails, the fallback for the rest of the run.
 
     A controller fails when it raises, returns what the contract forbids, declares a latency beyond `MAX_LATENCY`, or
@@ -96,7 +97,6 @@ class LowerBodyNode:
         return t - self._failed_at < RECOVERY
 
     def step(self, t: float) -> None:
-        """Publish leg targets, and what the base layer did."""
         state = self._bus.latest(topics.LOW_STATE)
         base = self._bus.latest(topics.BASE)
         if state is None or base is None:

@@ -15,6 +15,7 @@ from golem.interfaces.nav_payloads import HERE, Nav2Goal, Nav2Reply, NavGoal, Na
 from golem.interfaces.payloads import ModuleFaultMsg
 from golem.middleware.bus import Bus, News
 from golem.runtime.contract_check import ContractCheck
+from golem.runtime.executor import Node
 from golem.runtime.nodes import SkillNode
 from golem.skills.base import StageFailed
 from golem.skills.body_interface import LegsInterface
@@ -48,7 +49,7 @@ BODY_MARGIN = 0.01
 """By how much the robot's footprint is wider than its spheres [m]: these are conservative already."""
 
 
-class NavigatorNode:
+class NavigatorNode(Node):
     """Runs the navigator while a skill has a goal for it. It has its turn after the skill, in the same tick.
 
     A fault of it ends the skill, and nothing else. One navigator serves all goals: it may learn how these legs stop.
@@ -59,12 +60,7 @@ class NavigatorNode:
     def __init__(
         self, bus: Bus, navigator: Navigator, contract: ContractCheck, legs: LegsInterface, pool: Executor | None = None
     ) -> None:
-        """Run a navigator.
-
-        Args:
-            legs: the lower body, as the running skill reads it.
-            pool: where a navigator with a latency runs; None is here, at the price of the latency that it declares.
-        """
+        """Run a navigator, one with a latency in `pool`; None is here, at the price of the latency that it declares."""
         self._bus, self._navigator, self._slot, self._legs, self._pool = (bus, navigator, contract.slot, legs, pool)
         self._worker = pool if navigator.latency > 0.0 else None
         self._latency = 0.0 if self._worker is not None else navigator.latency
@@ -78,7 +74,6 @@ class NavigatorNode:
         self._pursue(NavGoal(None))
 
     def step(self, t: float) -> None:
-        """Take a new goal, compute the step that is due, and drive the legs by the newest that is there."""
         goal = self._goals.read()
         if goal is not None:
             self._pursue(goal)

@@ -19,8 +19,9 @@ from golem.middleware.bus import Bus, News
 from golem.native import HasStage
 from golem.robots.model.spatial import seen_from
 from golem.robots.model.table import JOINT_NAMES, load_limits
-from golem.runtime.chain import Link
+from golem.runtime.chain import HasLink, Link
 from golem.runtime.contract_check import ContractCheck
+from golem.runtime.executor import Node
 from golem.skills.base import SkillResult
 from golem.skills.context import Context
 from golem.skills.runner import LACKS, SkillRun
@@ -78,8 +79,8 @@ class ArmLimits:
     def check(self, q: Array) -> None:
         """Check the targets `q` (15,) of this tick [rad].
 
-        Raises:
-            ModuleFault: one is outside its position limits, or further from the previous one than its joint can move.
+        Raises ModuleFault: one is outside its position limits, or further from the previous one than its joint can
+        move.
         """
         self._q[:] = q
         i, excess = _furthest(self._q, self._lower, self._upper)
@@ -109,7 +110,7 @@ MIN_RATE = 1.0
 IDENTITY = np.eye(3)
 
 
-class EstimatorNode:
+class EstimatorNode(HasLink):
     """Runs the base estimator on every state."""
 
     period = TICK
@@ -120,7 +121,6 @@ class EstimatorNode:
         self._started = False
 
     def link(self) -> Link | None:
-        """Return how it takes part in the chain; None for an estimator without a stage."""
         stage = self._estimator.native() if isinstance(self._estimator, HasStage) else None
         if stage is None:
             return None
@@ -129,7 +129,6 @@ class EstimatorNode:
         return Link(self, stage, (topics.LOW_STATE,), (topics.BASE,), ready)
 
     def step(self, t: float) -> None:
-        """Publish the estimate of the base."""
         state = self._bus.latest(topics.LOW_STATE)
         if state is None:
             return
@@ -149,7 +148,7 @@ class EstimatorNode:
         self._bus.publish(topics.BASE, estimate, t)
 
 
-class UpperBodyNode:
+class UpperBodyNode(Node):
     """Runs the upper-body controller at its rate, its targets brought from odom into base_link.
 
     A joint trajectory that is newer than the palm targets is followed instead. The arms stay where it ends, and the
@@ -170,7 +169,6 @@ class UpperBodyNode:
         self._command: Array | None = None
 
     def step(self, t: float) -> None:
-        """Publish upper-body targets."""
         state = self._bus.latest(topics.LOW_STATE)
         base = self._bus.latest(topics.BASE)
         if state is None or base is None:
@@ -221,7 +219,7 @@ class UpperBodyNode:
         return command
 
 
-class HandNode:
+class HandNode(Node):
     """Runs the controller of one hand between the skills and the servos."""
 
     period = 0.01
@@ -234,7 +232,6 @@ class HandNode:
         self._frozen = False
 
     def step(self, t: float) -> None:
-        """Pass a new goal on, take in the hand's report, publish its command and status."""
         state = self._bus.latest(topics.hand_state(self._side))
         if state is None:
             return
@@ -273,7 +270,7 @@ class HandNode:
             self._contract.call(self._hand.open, goal.gap)
 
 
-class ServoNode:
+class ServoNode(HasLink):
     """Runs motor control on the newest targets of legs and upper body."""
 
     period = TICK
@@ -283,7 +280,6 @@ class ServoNode:
         contract.times.allowed = self.period
 
     def link(self) -> Link | None:
-        """Return how it takes part in the chain; None for a servo without a stage."""
         stage = self._servo.native() if isinstance(self._servo, HasStage) else None
         if stage is None:
             return None
@@ -291,7 +287,6 @@ class ServoNode:
         return Link(self, stage, reads, (topics.LOW_CMD_REQUEST,))
 
     def step(self, t: float) -> None:
-        """Publish the command that the safety gate shall judge."""
         state = self._bus.latest(topics.LOW_STATE)
         if state is None:
             return
@@ -313,7 +308,7 @@ class ServoNode:
         self._bus.publish(topics.LOW_CMD_REQUEST, command, t)
 
 
-class SkillNode:
+class SkillNode(Node):
     """Resumes the running skill, and ends it for a module's fault, or once the lower body runs on its fallback.
 
     Attributes:

@@ -25,6 +25,7 @@ from golem.robots.base import HasLidar
 from golem.robots.model.imu_mount import TORSO, sensed_base_rate
 from golem.robots.sensors.calibration import LidarCorrection
 from golem.runtime.contract_check import ContractCheck
+from golem.runtime.executor import Node
 from golem.types import TICK, Array, PlanarPose
 
 MEMORY = 0.6
@@ -35,7 +36,7 @@ BLIND = 0.35
 """Distance from the sensor within which a point is none of the world [m]."""
 
 
-class ScanNode:
+class ScanNode(Node):
     """Publishes every scan in odom. One of a time of which no pose is known is left out, and one that came before."""
 
     period = math.inf
@@ -51,7 +52,6 @@ class ScanNode:
         self._before: LidarScan | None = None
 
     def step(self, t: float) -> None:
-        """Keep the newest pose, and pose the newest scan."""
         pose = self._poses.read()
         if pose is not None and pose.T_base_lidar is not None:
             self._keep(pose, pose.T_base_lidar)
@@ -107,7 +107,7 @@ def _frozen(scan: LidarScan, before: LidarScan | None) -> bool:
     )
 
 
-class MapperNode:
+class MapperNode(Node):
     """Runs a mapper: every scan at once, a grid when one is due and something new was seen."""
 
     period = math.inf
@@ -121,7 +121,6 @@ class MapperNode:
         self._due = 0.0
 
     def step(self, t: float) -> None:
-        """Pass a new scan on, publish the map if it is due, and keep it if a skill wants that."""
         wanted = self._wanted.read()
         if wanted is not None:
             self._bus.publish(topics.MAP_SAVED, self._kept(wanted.path), t)
@@ -172,7 +171,7 @@ PERIOD = 0.01
 """Time between two poses that are published, and between two words of the legs [s]."""
 
 
-class OdometryNode:
+class OdometryNode(Node):
     """Runs an odometry that goes by more than the legs. While that is silent, so is the node."""
 
     period = PERIOD
@@ -189,7 +188,6 @@ class OdometryNode:
         self._why = ""
 
     def step(self, t: float) -> None:
-        """Pass on what is new, and publish the pose that is due."""
         call, odometry = self._contract.call, self._odometry
         if (sample := self._imu.read()) is not None:
             call(odometry.add_imu, self._correction.imu(sample))
@@ -224,7 +222,7 @@ class OdometryNode:
         self._contract.call(self._odometry.add_legs, LegOdometry(t, T, v, float(state.q[TORSO]), base.stale, rate))
 
 
-class LidarNode:
+class LidarNode(Node):
     """Publishes what the LiDAR of a robot says: every tick, or as often as its IMU has a sample."""
 
     def __init__(self, bus: Bus, robot: HasLidar, wanted: Callable[[], bool], contract: ContractCheck) -> None:
@@ -233,7 +231,6 @@ class LidarNode:
         self.period = contract.number("lidar_period", getattr(robot, "lidar_period", TICK), TICK)
 
     def step(self, t: float) -> None:
-        """Publish what is new."""
         if not self._wanted():
             return
         samples, scan = self._contract.call(self._robot.lidar, t)

@@ -19,6 +19,7 @@ from golem.interfaces.unitree_api import LOCO_API, LOCO_APIS, LocoApi
 from golem.middleware.bus import Bus, News
 from golem.middleware.wire.api import ApiRequest, Response
 from golem.robots.unitree.loco_service import LocoService
+from golem.runtime.executor import Node
 from golem.runtime.lower_body_node import CheckedLowerBody
 from golem.stack import Stack
 from golem.types import LEGS, TICK, BaseEstimate, LowState
@@ -44,21 +45,18 @@ class BusOnboard:
         self._news: dict[str, News[Response]] = {}
 
     def send(self, service: str, request: ApiRequest) -> None:
-        """Send a request; see `vendor.Onboard`."""
         if service not in self._news:
             self._news[service] = News(self._bus, topics.api_response(service))
         self._bus.publish(topics.api_request(service), request, 0.0)  # no latency: the time has no meaning
 
     def receive(self, service: str) -> Response | None:
-        """Return a new response; see `vendor.Onboard`."""
         return self._news[service].read() if service in self._news else None
 
     def legs(self) -> LegCommand | None:
-        """Return the on-board controller's targets; see `vendor.Onboard`."""
         return self._bus.latest(topics.ONBOARD_LEGS)
 
 
-class ServiceNode:
+class ServiceNode(Node):
     """Answers the calls to one service, one per tick."""
 
     period = math.inf
@@ -71,7 +69,6 @@ class ServiceNode:
         self._requests = News(bus, topics.api_request(service))
 
     def step(self, t: float) -> None:
-        """Answer the call that came, if one did."""
         request = self._requests.read()
         if request is None:
             return
@@ -80,7 +77,7 @@ class ServiceNode:
             self._bus.publish(self._topic, response, t, ANSWER)
 
 
-class LocoServiceNode:
+class LocoServiceNode(Node):
     """Answers calls, and controls the legs on board in the state that was called for.
 
     In the start state the robot is controlled by any lower body, under a base layer of its own. A controller that fails
@@ -99,7 +96,6 @@ class LocoServiceNode:
         self._calls = ServiceNode(bus, api.service, self.service.answer)
 
     def step(self, t: float) -> None:
-        """Answer a call, and publish what the legs are told."""
         self._calls.step(t)
         state = self._bus.latest(topics.LOW_STATE)
         base = self._bus.latest(topics.BASE)

@@ -22,6 +22,7 @@ from golem.robots.model.pinocchio_model import Kinematics
 from golem.robots.sensors.calibration import OPTICAL_FRAMES
 from golem.runtime.checked import CheckedMemory
 from golem.runtime.contract_check import ContractCheck
+from golem.runtime.executor import Node
 from golem.types import TICK, Array, BaseEstimate, LocalizedObject, LowState, Mask, RgbdImage
 
 LATENCY = 0.033
@@ -30,7 +31,7 @@ MEMORY = 1.0
 """How old an exposure may be when its frame arrives [s]."""
 
 
-class CameraNode:
+class CameraNode(Node):
     """Exposes one camera at its frame rate while somebody wants its frames."""
 
     def __init__(self, bus: Bus, robot: Robot, name: str, wanted: Callable[[], bool], contract: ContractCheck) -> None:
@@ -40,13 +41,12 @@ class CameraNode:
         self.period = 1.0 / self._info.rate
 
     def step(self, t: float) -> None:
-        """Publish one exposure."""
         if self._wanted():
             rgb, depth = self._contract.call(self._robot.capture, self._info.name)
             self._bus.publish(topics.exposures(self._info.name), Exposure(t, self._info, rgb, depth), t)
 
 
-class ImagePoseNode:
+class ImagePoseNode(Node):
     """Gives each exposure the pose the robot believes the camera had when it was made."""
 
     def __init__(self, bus: Bus, calibration: Mapping[str, Array], latency: float) -> None:
@@ -63,7 +63,6 @@ class ImagePoseNode:
         self._moments: deque[tuple[LowState, BaseEstimate]] = deque()
 
     def step(self, t: float) -> None:
-        """Remember where the robot is, and publish a frame for each exposure that came."""
         state = self._bus.latest(topics.LOW_STATE)
         base = self._bus.latest(topics.BASE)
         if state is None or base is None:
@@ -88,7 +87,7 @@ class ImagePoseNode:
         return base.T_odom_base @ T_base_optical
 
 
-class LocalizerNode:
+class LocalizerNode(Node):
     """Runs the localizer on every new frame of one camera; live, beside the clock, on a thread of its own.
 
     A fault of it ends the skill that looks, and nothing else: no robot falls over a label that nobody knows.
@@ -108,7 +107,6 @@ class LocalizerNode:
         self._job: tuple[Future[Detections], tuple[str, ...]] | None = None
 
     def step(self, t: float) -> None:
-        """Publish what is in the newest frame, if it is new, or what the thread has found."""
         if self._job is not None:
             job, labels = self._job
             if not job.done():
@@ -179,7 +177,7 @@ SHOWN = 40
 """Most places that are shown to people, those seen last."""
 
 
-class MemoryNode:
+class MemoryNode(Node):
     """Gives a memory every look in which something was looked for; live, beside the clock, on a thread of its own.
 
     It asks for no look itself: skills do. Where the robot has a map, places are in the map's frame, and what is seen
@@ -211,7 +209,6 @@ class MemoryNode:
         self._job: tuple[Future[str], float] | None = None
 
     def step(self, t: float) -> None:
-        """Take in what came, and say how that went."""
         if not self._began:
             self._began = True
             self._tell(t, "", t, looks=0)

@@ -10,12 +10,12 @@ from golem.interfaces import topics
 from golem.middleware.bus import Bus
 from golem.native import CompiledStage
 from golem.robots.base import HasStages, Robot
-from golem.runtime.chain import Link
+from golem.runtime.chain import HasLink, Link
 from golem.runtime.contract_check import ContractCheck
 from golem.types import COMMAND_AGE, NUM_JOINTS, SIDES, TICK, Array, HandCommand, LowCommand, LowState, Side
 
 
-class SenseNode:
+class SenseNode(HasLink):
     """Publishes what motors, IMU and hands report."""
 
     period = TICK
@@ -26,14 +26,12 @@ class SenseNode:
         self._keep = robot.keep_moment if isinstance(robot, HasStages) else None
 
     def link(self) -> Link | None:
-        """Return how it takes part in the chain; None for a robot without stages."""
         stages = _stages(self._robot, self._offset)
         if stages is None:
             return None
         return Link(self, stages[0], (), (topics.LOW_STATE, *map(topics.hand_state, SIDES)))
 
     def step(self, t: float) -> None:
-        """Publish one sample of everything."""
         call = self._contract.call
         q, dq, tau = call(self._robot.joints)
         q = q if self._offset is None else q - self._offset
@@ -44,7 +42,7 @@ class SenseNode:
             self._keep(t)
 
 
-class ActNode:
+class ActNode(HasLink):
     """Lets time pass under the newest command that left the safety gate."""
 
     period = TICK
@@ -55,7 +53,6 @@ class ActNode:
         self._taken: dict[Side, HandCommand] = {}
 
     def link(self) -> Link | None:
-        """Return how it takes part in the chain; None for a robot without stages."""
         robot = self._robot
         stages = _stages(robot, self._offset)
         if stages is None or not isinstance(robot, HasStages):

@@ -17,7 +17,8 @@ from golem.hardware.safety.standing_gate import StandingController, StandingGate
 from golem.interfaces import topics
 from golem.interfaces.payloads import GateState, GateStatus, Reason
 from golem.middleware.bus import Bus, News
-from golem.runtime.chain import Link
+from golem.runtime.chain import HasLink, Link
+from golem.runtime.executor import Node
 from golem.types import TICK
 
 ASKED = frozenset({Reason.REQUESTED, Reason.ESTOP_PRESSED})
@@ -58,7 +59,7 @@ def tallied() -> Generator[GateTally]:
         _CURRENT.reset(token)
 
 
-class EstopNode:
+class EstopNode(Node):
     """Publishes the frames of the emergency stop."""
 
     def __init__(self, bus: Bus, estop: EmergencyStop) -> None:
@@ -67,17 +68,15 @@ class EstopNode:
         self.period = estop.period if isinstance(estop, VirtualEstop) else TICK
 
     def step(self, t: float) -> None:
-        """Publish a frame when there is one."""
         frame = self._estop.step(t)
         if frame is not None:
             self._bus.publish(topics.ESTOP, frame, t)
 
 
-class SafetyNode:
+class SafetyNode(HasLink):
     """Runs the safety gate; the only writer of the motors' command.
 
-    Attributes:
-        request: what the operator asks for; `ACTIVATE` is taken up as soon as the gate is armed.
+    Of what the operator asks for by `request`, `ACTIVATE` is taken up as soon as the gate is armed.
     """
 
     period = TICK
@@ -94,7 +93,6 @@ class SafetyNode:
         self.request = OperatorRequest.NONE
 
     def link(self) -> Link:
-        """Return how it takes part in the chain."""
         self._chained = chained = GateStage(self._gate.gate.limits)
         reads = topics.LOW_STATE, topics.LOW_CMD_REQUEST, topics.ESTOP, topics.BASE
         return Link(self, chained.stage, reads, (topics.LOW_CMD, topics.SAFETY), self._prepare, self._passed)
@@ -114,7 +112,6 @@ class SafetyNode:
                 self._tally.add(GateState.ACTIVE, GateState.ACTIVE, None)
 
     def step(self, t: float) -> None:
-        """Let the newest command through, limited, or stop the robot."""
         if self._away and self._chained is not None:
             self._away = False
             self._gate.gate.memory = self._chained.give_back(self._gate.memory)

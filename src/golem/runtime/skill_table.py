@@ -21,9 +21,8 @@ class SkillTable:
     def __init__(self, stack: Stack) -> None:
         """Load every skill of `stack`, and make each once: a wrong option is better said now than when it is called.
 
-        Raises:
-            ConfigError: a name or an option is wrong.
-            ModuleFault: a constructor raised, or a skill lacks a part of its contract.
+        Raises ConfigError: a name or an option is wrong; ModuleFault: a constructor raised, or a skill lacks a part of
+        its contract.
         """
         self._choices = stack.all_skills
         self.specs = {name: _spec(name, choice) for name, choice in self._choices.items()}

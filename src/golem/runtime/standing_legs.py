@@ -17,6 +17,7 @@ from golem.interfaces import topics
 from golem.middleware.bus import Bus
 from golem.robots.base import HasGantry
 from golem.runtime.contract_check import ContractCheck
+from golem.runtime.executor import Node
 from golem.runtime.nodes import moving
 from golem.types import LEGS, NUM_JOINTS, TICK, Array, LowCommand, LowState
 
@@ -28,7 +29,7 @@ FOUND = 0.5
 estimate of nothing falls later, and nobody would say why."""
 
 
-class GantryReleaseNode:
+class GantryReleaseNode(Node):
     """Releases the band once the gate is active, the servo stiff, and a leg controller at work.
 
     Raises, from `step`:

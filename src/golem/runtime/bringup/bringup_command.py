@@ -168,14 +168,9 @@ class HandMove:
 
 
 def hand_move(states: Sequence[LowState], start: Array) -> HandMove | None:
-    """Return the joint that has moved from `start` alone, once one has.
+    """Return the joint that has moved from `start` (27,) [rad] alone, once one has, by `states` since, oldest first.
 
-    Args:
-        states: since then, oldest first.
-        start: (27,) joints before the motion [rad].
-
-    Returns:
-        None while none has moved by `ENOUGH`, or another more than half as far.
+    None while none has moved by `ENOUGH`, or another more than half as far.
     """
     if len(states) < 2:
         return None
@@ -192,9 +187,7 @@ def hand_move(states: Sequence[LowState], start: Array) -> HandMove | None:
 def wrong_with(move: HandMove, wanted: int, positive: bool, names: Sequence[str]) -> str:
     """Return what is wrong with what was reported of a joint that a person moved; empty if nothing is.
 
-    Args:
-        wanted: index of the joint that the person moved.
-        names: of the `NUM_JOINTS` joints.
+    The person moved the joint `wanted`, an index of the `NUM_JOINTS` names.
     """
     assert len(names) == NUM_JOINTS
     if move.joint != wanted:
@@ -259,10 +252,9 @@ CHECKS: tuple[base.BringupStep, ...] = (
 
 
 class Terminal:
-    """A person at a terminal."""
+    """A person at a terminal; see `BringupPerson`."""
 
     def tell(self, text: str) -> None:
-        """Print."""
         log_line(text)
 
     def confirm(self, question: str, word: str) -> bool:
@@ -273,7 +265,6 @@ class Terminal:
             return False
 
     def act(self, task: base.Task) -> None:
-        """Print what is to be done."""
         log_line(f"  -> {task.text}")
 
 

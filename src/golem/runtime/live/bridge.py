@@ -13,7 +13,7 @@ from typing import Any
 from golem.interfaces import public
 from golem.interfaces.rows import TopicRow
 from golem.middleware.bus import Bus, News
-from golem.runtime.executor import Phase, Placed
+from golem.runtime.executor import Node, Phase, Placed
 from golem.runtime.live.node_setup import log_line
 from golem.runtime.live.role_endpoints import RoleEndpoints
 from golem.types import TICK
@@ -49,7 +49,7 @@ Takers = Mapping[str, Callable[[Any], None]]
 """By topic: what takes its values where they do not simply go to the bus."""
 
 
-class StreamOut:
+class StreamOut(Node):
     """Sends the values of one stream of the bus, each once; of a thinned one the newest of each period."""
 
     def __init__(
@@ -63,7 +63,6 @@ class StreamOut:
         self._news = News(bus, row.key)
 
     def step(self, t: float) -> None:
-        """Send a new value."""
         value = self._news.read()
         if value is not None:
             self._endpoints.send(self._name, value, self._encode)
@@ -81,11 +80,9 @@ class StreamIn:
         tell: Callable[[str], None] = log_line,
         take: Callable[[Any], None] | None = None,
     ) -> None:
-        """Subscribe. Raises ValueError: the row is of no stream, not for this role, or cannot be read.
+        """Subscribe; `now` is robot time [s], and `tell` says to a person what is refused.
 
-        Args:
-            now: robot time [s].
-            tell: says to a person what is refused.
+        Raises ValueError: the row is of no stream, not for this role, or cannot be read.
         """
         key = row.key
         if key is None:
@@ -97,11 +94,9 @@ class StreamIn:
 def outgoing(
     bus: Bus, endpoints: RoleEndpoints, encoders: Encoders | None = None, without: Collection[str] = ()
 ) -> list[Placed]:
-    """Return what sends every stream that `endpoints` offer. Raises ValueError: nobody says how to send one of them.
+    """Return what sends every stream that `endpoints` offer, but those of topics `without`, which somebody else sends.
 
-    Args:
-        encoders: for the rows that have none.
-        without: topics that somebody else sends.
+    The `encoders` are for rows that have none. Raises ValueError: nobody says how to send one of them.
     """
     encoders = encoders or {}
     return [

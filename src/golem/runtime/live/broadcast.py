@@ -29,7 +29,7 @@ from golem.runtime.lockstep import LockstepRunner
 from golem.types import TICK
 
 
-class StatusOut:
+class StatusOut(Node):
     """Sends the verdicts of the gate: at every change, and regularly."""
 
     period = TICK
@@ -38,7 +38,6 @@ class StatusOut:
         self._news, self._reports = News(bus, topics.SAFETY), StatusReports(endpoints)
 
     def step(self, t: float) -> None:
-        """Take a new verdict."""
         status = self._news.read()
         if status is not None:
             self._reports.add(status)
@@ -100,16 +99,10 @@ def _nodes(bus: Bus, robot: Robot, domain: LocalDomain) -> list[Node]:
 def broadcast(
     running: LockstepRunner, robot: Robot, bag: Path | None = None, foxglove: int | None = None
 ) -> Iterator[Callable[[], None]]:
-    """Yield what is to be called after every tick, so that a stack in lock-step is recorded and shown.
+    """Yield what is to be called after every tick: it records a stack in lock-step to `bag`, and shows it on a port.
 
-    Args:
-        bag: folder of the bag to write, if any.
-        foxglove: port on which to serve Foxglove's protocol, if at all.
-
-    Raises:
-        MissingExtra: the extra `record` or `foxglove` is not installed.
-        OutputError: the bag cannot be written.
-        ConfigError: the port is taken.
+    Raises MissingExtra: the extra `record` or `foxglove` is not installed; OutputError: the bag cannot be written;
+    ConfigError: the port is taken.
     """
     with ExitStack() as stack:
         casts: list[Broadcast] = []

@@ -26,8 +26,7 @@ def time_since_boot() -> float:
 class Rate:
     """How fast the robot's time runs by our clock: 2 ms a state if its unit is what we take it for.
 
-    Attributes:
-        value: over the last `WINDOW`; None before the first.
+    Its `value` is over the last `WINDOW`; None before the first.
     """
 
     def __init__(self) -> None:
@@ -63,11 +62,9 @@ class RobotClock:
     """
 
     def __init__(self, now: Callable[[], float], writers: Callable[[], Container[int]]) -> None:
-        """Start before the first state.
+        """Start before the first state; `now` is this process's own clock [s].
 
-        Args:
-            now: this process's own clock [s].
-            writers: tells who writes states; one that was killed is among them for ten seconds more.
+        Who writes states is among the `writers`; one that was killed for ten seconds more.
         """
         self.t, self.heard, self.restarted = -math.inf, -math.inf, False
         self._now, self._writers = now, writers

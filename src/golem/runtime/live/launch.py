@@ -189,10 +189,7 @@ class Launcher:
     def __init__(self, words: dict[Part, list[str]], node: RosNode, activate: bool, damper: Damper) -> None:
         """Start the processes, `words` being their command lines; watch the gate through `node`.
 
-        Args:
-            words: command line of each.
-            activate: whether to open the gate once it is armed.
-            damper: has the motors when the gate has died.
+        The gate is opened once it is armed, if `activate`; when it has died, the `damper` has the motors.
         """
         self._damper = damper
         self._words, self._node, self._activate = words, node, activate

@@ -68,11 +68,7 @@ class MotionSwitcherClient:
         self._call(RELEASE_MODE)
 
     def doubt(self, moving: bool) -> str:
-        """Return why the motors may be somebody else's; empty if they are not.
-
-        Args:
-            moving: whether they are in use already: then only an answer stops that, not its absence.
-        """
+        """Return why the motors may be somebody else's; empty if not. While `moving`, only an answer says so."""
         if self.owner:
             return (
                 f"the robot's own controller '{self.owner}' has the motors; "

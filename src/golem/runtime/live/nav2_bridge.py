@@ -14,6 +14,7 @@ from golem.middleware.ros.future import Future
 from golem.middleware.ros.goals import GoalStatus
 from golem.middleware.ros.msgs import geometry_msgs
 from golem.middleware.ros.node import RosNode
+from golem.runtime.executor import Node
 from golem.types import TICK
 
 ACTION, TYPE = "/navigate_to_pose", "nav2_msgs/action/NavigateToPose"
@@ -25,7 +26,7 @@ ENDED: dict[GoalStatus, Nav2State] = {
 }
 
 
-class Nav2Bridge:
+class Nav2Bridge(Node):
     """Passes goals on as soon as Nav2 is there, and cancels them when the skill has no use for them any more."""
 
     period = TICK
@@ -45,7 +46,6 @@ class Nav2Bridge:
         node.subscription(VELOCITY, "geometry_msgs/msg/Twist", self._take)
 
     def step(self, t: float) -> None:
-        """Send a new goal, cancel one that is over, and tell how the newest stands."""
         pursued = self._pursued.read()
         if pursued is not None:
             self._frame = pursued.frame

@@ -12,6 +12,7 @@ from dataclasses import replace
 from golem.interfaces import topics
 from golem.middleware.bus import Bus, News
 from golem.middleware.wire.api import ApiRequest, Response, RpcClient, RpcServer
+from golem.runtime.executor import Node
 from golem.types import TICK
 
 WAITING = 64
@@ -20,7 +21,7 @@ _CALLS = 2**16
 """Calls of one client before its identities repeat."""
 
 
-class CallsIn:
+class CallsIn(Node):
     """Brings calls from the domain to the service on the bus."""
 
     period = TICK
@@ -30,13 +31,12 @@ class CallsIn:
         self._waiting: deque[ApiRequest] = deque(maxlen=WAITING)
 
     def step(self, t: float) -> None:
-        """Let the oldest call onto the bus."""
         self._waiting.extend(self._server.take())
         if self._waiting:
             self._bus.publish(self._topic, self._waiting.popleft(), t)
 
 
-class AnswersOut:
+class AnswersOut(Node):
     """Sends the answers of the service on the bus."""
 
     period = TICK
@@ -45,7 +45,6 @@ class AnswersOut:
         self._news, self._server = News(bus, topics.api_response(service)), server
 
     def step(self, t: float) -> None:
-        """Send a new answer."""
         response = self._news.read()
         if response is not None:
             self._server.reply(response)
@@ -68,7 +67,7 @@ class Identities:
         return replace(response, id=number) if 0 <= number < _CALLS else None
 
 
-class CallsOut:
+class CallsOut(Node):
     """Sends the calls on the bus to a service on the domain; while nobody offers it the newest call waits."""
 
     period = TICK
@@ -79,14 +78,13 @@ class CallsOut:
         self._unsent: ApiRequest | None = None
 
     def step(self, t: float) -> None:
-        """Send a new call."""
         self._unsent = self._news.read() or self._unsent
         if self._unsent is not None and self._client.connected:
             self._client.send(self._identities.outgoing(self._unsent))
             self._unsent = None
 
 
-class AnswersIn:
+class AnswersIn(Node):
     """Brings the answers to the calls of `CallsOut` to the bus."""
 
     period = TICK
@@ -97,7 +95,6 @@ class AnswersIn:
         self._waiting: deque[Response] = deque(maxlen=WAITING)
 
     def step(self, t: float) -> None:
-        """Let the oldest answer onto the bus."""
         for response in self._client.take():
             own = self._identities.incoming(response)
             if own is not None:

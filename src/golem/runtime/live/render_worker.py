@@ -20,7 +20,7 @@ from golem.interfaces.payloads import Exposure
 from golem.middleware.bus import Bus
 from golem.middleware.dds.domain import DdsConfig
 from golem.robots.base import Restorable
-from golem.runtime.executor import Placed
+from golem.runtime.executor import Node, Placed
 from golem.runtime.live.bridge import outgoing
 from golem.runtime.live.node_setup import member
 from golem.runtime.live.robot_out import images_wanted
@@ -39,7 +39,7 @@ def image_topics() -> set[str]:
     return {public.image(camera, what) for camera in public.CAMERAS for what in public.IMAGES}
 
 
-class RenderWorker:
+class RenderWorker(Node):
     """The twin's end: hands a snapshot over when a camera is due and the darkroom free.
 
     Once an exposure takes longer than its camera has until the next, the robot's time waits: see `live.sim_sync`.
@@ -124,16 +124,7 @@ def expose(
     t: float,
     save_state: bytes,
 ) -> None:
-    """Send the images of one moment, if anybody wants them.
-
-    Args:
-        robot: a robot that recalls.
-        endpoints: where the images go.
-        bus: between the two.
-        streams: what sends the images on `bus`.
-        t: time of the moment [s].
-        save_state: the moment.
-    """
+    """Send the images of one moment, `save_state` at `t` [s], if anybody wants them; `robot` is one that recalls."""
     if images_wanted(endpoints, name):
         robot.restore_state(save_state)
         rgb, depth = robot.capture(name)

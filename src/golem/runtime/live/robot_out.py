@@ -26,8 +26,7 @@ LINKS = tuple((hinge.parent, hinge.child) for hinge in tree.HINGES)
 def describe(endpoints: RoleEndpoints, calibration: Mapping[str, Array]) -> None:
     """Publish what holds for good: the description, and every frame that does not move in its parent.
 
-    Args:
-        calibration: of each camera; see `Robot.calibration`. Its optical frame in /tf_static is the claimed one.
+    The optical frames in /tf_static are those that `calibration` claims; see `Robot.calibration`.
     """
     endpoints.publish("/robot_description", String(export_urdf(hands=True)))
     links = [(edge.parent, edge.child) for edge in tree.FIXED]

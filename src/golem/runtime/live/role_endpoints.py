@@ -18,10 +18,11 @@ from golem.middleware.ros.node import RosNode
 from golem.middleware.ros.pubsub import Publisher, Subscription
 from golem.middleware.ros.waitset import Inbox, WaitSet
 from golem.middleware.wire.struct_layout import WireError
+from golem.runtime.executor import Node
 from golem.types import TICK
 
 
-class RoleEndpoints:
+class RoleEndpoints(Node):
     """The endpoints of one role's `rows`; as a node of an executor it handles what has arrived, once per tick."""
 
     period = TICK
@@ -29,13 +30,7 @@ class RoleEndpoints:
     def __init__(
         self, role: Role, participant: Participant, node: RosNode, only: Collection[str] | None = None
     ) -> None:
-        """Publish every topic of `role`, or `only` some of them.
-
-        Args:
-            participant: what the vendor's own topics are created by.
-            node: what all others are created by.
-            only: names of topics; None is all.
-        """
+        """Publish every topic of `role`, or `only` some: the vendor's own by `participant`, all others by `node`."""
         self.role, self.node = role, node
         self._participant = participant
         self._arrived = WaitSet()
@@ -50,7 +45,6 @@ class RoleEndpoints:
                 self._publishers[name] = node.publisher(name, row.type, row.qos)
 
     def step(self, t: float) -> None:
-        """Handle what has arrived."""
         self.node.poll()
         self._arrived.poll()
 
@@ -85,11 +79,8 @@ class RoleEndpoints:
     ) -> None:
         """Give the values of a topic to `take`, as the table reads them, when what has arrived is handled.
 
-        Args:
-            refuse: told why a message is none.
-
-        Raises:
-            ValueError: the table does not let this role read it, or does not say how.
+        Why a message is none is told to `refuse`. Raises ValueError: the table does not let this role read it, or does
+        not say how.
         """
         row = self._read(topic)
         decode = row.decode

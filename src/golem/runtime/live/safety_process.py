@@ -53,8 +53,7 @@ class CommandLease:
     def doubt(self, moving: bool) -> str:
         """Return what speaks against letting commands through; empty if nothing does.
 
-        Args:
-            moving: whether commands pass now, so that a change of the writer is one nobody asked for.
+        If `moving`, commands pass now, and nobody has asked for a change of the writer.
         """
         present = self._present()
         if len(present) > 1:

@@ -13,6 +13,7 @@ from golem.middleware.bus import News
 from golem.middleware.ros.action_server import ServerGoal
 from golem.middleware.ros.callback_guard import CallbackGuard, log_error
 from golem.middleware.ros.goals import GoalStatus
+from golem.runtime.executor import Node
 from golem.runtime.live.role_endpoints import RoleEndpoints
 from golem.runtime.live.safety_status import describe_status
 from golem.runtime.live.skill_messages import SkillAction, skill_actions
@@ -24,7 +25,7 @@ from golem.types import TICK
 SILENT = "The robot has fallen silent."
 
 
-class SkillActionServer:
+class SkillActionServer(Node):
     """Pursues the goals of all skill actions, one at a time, with the stack that is attached.
 
     A goal that cannot be begun is accepted and aborted at once: its result then says why, which a rejection cannot.
@@ -109,7 +110,6 @@ class SkillActionServer:
         return True
 
     def step(self, t: float) -> None:
-        """Pass feedback on, and end what has ended."""
         pursuit, stack = self._pursuit, self._stack
         if pursuit is None or stack is None:
             return
@@ -164,13 +164,10 @@ class Handler:
     action: SkillAction
 
     def decide(self, request: Any) -> bool:
-        """Take every goal on; see `SkillActionServer`."""
         return True
 
     def accepted(self, goal: ServerGoal) -> None:
-        """Begin it."""
         self.skills.begin(self.action, goal)
 
     def cancel(self, goal: ServerGoal) -> bool:
-        """Cancel it."""
         return self.skills.cancel(goal)

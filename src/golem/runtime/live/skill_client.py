@@ -152,12 +152,8 @@ def compose(node: RosNode, config: SkillClientConfig, words: list[str], remedy: 
 def pursue(node: RosNode, goal: RunSkill_Goal, remedy: str, stop: threading.Event) -> int:
     """Give the stack on the domain a goal, print what it says until it ends, and return the exit code.
 
-    Args:
-        remedy: what to do where nobody offers the action.
-        stop: set by Ctrl-C: first to cancel, then to leave.
-
-    Raises:
-        RosError: no stack is there, or it went away.
+    Ctrl-C sets `stop`: first to cancel, then to leave. Raises RosError: no stack is there, which `remedy` helps, or it
+    went away.
     """
     pursued = propose(node, goal, remedy)
     result, asked = pursued.result(), None

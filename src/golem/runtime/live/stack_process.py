@@ -26,7 +26,7 @@ from golem.middleware.wire import convert
 from golem.middleware.wire.api import RpcClient, request_topic, response_topic
 from golem.middleware.wire.struct_layout import WireError
 from golem.robots.sensors.calibration import calibrations
-from golem.runtime.executor import Executor, Phase, Placed, in_order
+from golem.runtime.executor import Executor, Node, Phase, Placed, in_order
 from golem.runtime.live import stack_streams as out
 from golem.runtime.live.bridge import RejectedMessages, incoming, outgoing
 from golem.runtime.live.clock import RobotClock
@@ -95,7 +95,7 @@ BLIND = 3.0
 loses it is stopped, one that never had it is not, since a robot that hangs has its feet in the air."""
 
 
-class LegsMonitor:
+class LegsMonitor(Node):
     """Tells of the fallback that took the legs, and of legs without a base estimate."""
 
     period = 0.1
@@ -107,7 +107,6 @@ class LegsMonitor:
         self._blind_since: float | None = None
 
     def step(self, t: float) -> None:
-        """Look at the legs' newest report and the newest base estimate at time `t` [s]."""
         legs = self._bus.latest(topics.LEG_STATUS)
         if legs is not None and legs.fault is not None and legs.fault != self._fault:
             self._fault = legs.fault

@@ -33,6 +33,7 @@ from golem.middleware.wire.convert import encode_low_command
 from golem.robots.model import magpie_model
 from golem.robots.model.imu_mount import sensed_base_rate
 from golem.robots.sensors.cameras import CAMERAS
+from golem.runtime.executor import Node
 from golem.runtime.live.bridge import Encoders
 from golem.runtime.live.node_setup import log_line
 from golem.runtime.live.role_endpoints import RoleEndpoints
@@ -99,7 +100,7 @@ AHEAD = 0.05
 """How far ahead of the robot's time an image may be stamped [s] [own]: more, and its clock is another."""
 
 
-class CameraIn:
+class CameraIn(Node):
     """Subscribes to the images of one camera while a skill looks through it, and brings them to the bus in pairs."""
 
     period = TICK
@@ -113,7 +114,6 @@ class CameraIn:
         self._pairing = Pairing(self._take)
 
     def step(self, t: float) -> None:
-        """Come or go, as skills want."""
         self._t = t
         if bool(self._open) == self._wanted():
             return
@@ -159,7 +159,7 @@ class CameraIn:
             )
 
 
-class OnePerTick(Generic[T]):
+class OnePerTick(Node, Generic[T]):
     """Brings values to the bus one per tick: of those that arrive together the bus would keep the newest alone."""
 
     period = TICK
@@ -174,12 +174,11 @@ class OnePerTick(Generic[T]):
         self._waiting.append(value)
 
     def step(self, t: float) -> None:
-        """Publish the oldest."""
         if self._waiting:
             self._bus.publish(self._topic, self._waiting.popleft(), t)
 
 
-class GateIn:
+class GateIn(Node):
     """Brings the verdicts of the safety gate to the bus; a gate that is silent counts as shut."""
 
     period = TICK
@@ -191,7 +190,6 @@ class GateIn:
         self._status: GateStatus | None = None
 
     def step(self, t: float) -> None:
-        """Publish the newest verdict."""
         self._t = t
         silent = self._clock() - self._heard_at > SILENCE
         if silent or self._status is None:

@@ -20,7 +20,7 @@ from golem.middleware.wire.struct_layout import WireError
 from golem.robots.base import HasGantry, Robot
 from golem.robots.unitree import loco_service
 from golem.runtime import nodes
-from golem.runtime.executor import Executor, Phase, Placed, in_order
+from golem.runtime.executor import FOREVER, Executor, Node, Phase, Placed, in_order
 from golem.runtime.live.bridge import RejectedMessages, incoming, outgoing
 from golem.runtime.live.node_setup import log_line
 from golem.runtime.live.onboard_bridge import AnswersOut, CallsIn
@@ -34,13 +34,10 @@ from golem.stack import Stack
 from golem.types import TICK
 
 
-class CommandIn:
-    """Takes what the motors are told, as the robot does: what is damaged or for another machine is ignored.
+class CommandIn(Node):
+    """Takes what the motors are told, as the robot does: what is damaged or for another machine is `refused`.
 
     The robot's time stands still while an active stack is more than `LAG` behind it: see `golem.runtime.live.sim_sync`.
-
-    Attributes:
-        refused: those.
     """
 
     period = TICK
@@ -57,7 +54,6 @@ class CommandIn:
         self._inbox = endpoints.receive("/lowcmd", self._waitset, self._take)
 
     def step(self, t: float) -> None:
-        """Take what has come, and wait for what should have."""
         self._t = t
         self._waitset.poll()
         end = time.monotonic() + self._patience
@@ -84,7 +80,7 @@ class CommandIn:
         self._bus.publish(topics.LOW_CMD, command, self._t)
 
 
-class UnansweredCalls:
+class UnansweredCalls(Node):
     """Reads the calls to the loco service of a robot that has no such service, and says so at the first."""
 
     period = TICK
@@ -95,7 +91,6 @@ class UnansweredCalls:
         self._reported = False
 
     def step(self, t: float) -> None:
-        """Look for a call."""
         call = self._news.read()
         if call is None or self._reported:
             return
@@ -105,10 +100,6 @@ class UnansweredCalls:
             "Nobody answers it: this robot has no legs on board. "
             "They come with this line in the stack file: lower_body: {use: vendor}."
         )
-
-
-FOREVER = 1e9
-"""A time nobody sees [s]."""
 
 
 class Twin:
@@ -126,10 +117,8 @@ class Twin:
     ) -> None:
         """Put a robot on the domain. Raises ConfigError, ModuleFault: about the on-board legs.
 
-        Args:
-            render_worker: where its images are made; None renders here, which holds everything else up meanwhile.
-            patience: how long its time stands still at most for a stack that is behind [s].
-            tell: says a line to a person.
+        Its images are made by `render_worker`; None renders here, which holds everything else up meanwhile. Its time
+        stands still for `patience` at most for a stack that is behind [s]. `tell` says a line to a person.
         """
         bus = Bus()
         images = image_topics()
