@@ -69,11 +69,7 @@ def expect(what: str, value: object, kind: type[Any]) -> None:
 
 
 class StageFailed(GolemError):
-    """A stage of a skill did not reach its goal; the skill turns it into its result.
-
-    Attributes:
-        stage, slot: as in `SkillResult`.
-    """
+    """A stage of a skill did not reach its goal; the skill turns it, its `stage` and `slot`, into its result."""
 
     def __init__(self, stage: str, slot: str, reason: str) -> None:
         """Say which `stage` failed, which `slot` is held responsible, and why."""

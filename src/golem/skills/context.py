@@ -86,13 +86,7 @@ class Arm:
     async def move(
         self, T_goal: Array, v_max: float, w_max: float = 1.5, stop: Callable[[], bool] = lambda: False
     ) -> None:
-        """Go straight to `T_goal` (4, 4) in odom; ends early once `stop()` is true.
-
-        Args:
-            v_max: speed [m/s].
-            w_max: angular speed [rad/s].
-            stop: asked every tick.
-        """
+        """Go straight to `T_goal` (4, 4) in odom, at `v_max` [m/s] and `w_max` [rad/s]; end once `stop()` is true."""
         self._velocity = np.zeros(3)
         line = Line(self.commanded, T_goal, v_max, w_max)
         start = self._context.t
@@ -126,11 +120,7 @@ class Arm:
         self._send(T)
 
     async def settle(self, tolerance: float, timeout: float) -> float:
-        """Wait until the gripper is within `tolerance` [m] of where it was sent, at most `timeout` [s].
-
-        Returns:
-            The distance that is left [m].
-        """
+        """Wait until the gripper is within `tolerance` [m] of its goal, or `timeout` [s]; return what is left [m]."""
         end = self._context.t + timeout
         while True:
             left = float(np.linalg.norm(self.pose[:3, 3] - self.commanded[:3, 3]))
@@ -287,9 +277,6 @@ class Context:
         """Return the grasps that `method` proposes for `target`, best first, once it has thought.
 
         Args:
-            method: from `grasp_method`.
-            target: as a camera saw it.
-            side: of the hand that is to grasp.
             yaw: heading of the gripper's x axis about the vertical that suits the arm best, in odom [rad].
             approach: direction in odom along which the hand is to come, of unit length.
             scene: (n, 3) points in odom of what is around [m]; by default what the head camera shows.
@@ -379,7 +366,6 @@ class Context:
     def watch(self, camera: str, *labels: str, doubtful: tuple[str, ...] = ()) -> DetectionStream:
         """Let a camera stream what it sees of `labels`, for as long as the returned `DetectionStream` is open.
 
-        Args:
-            doubtful: those of them of which unsure sightings are passed on, too, since the caller can tell.
+        Of the `doubtful` ones of them unsure sightings are passed on, too, since the caller can tell.
         """
         return DetectionStream(self, camera, labels, doubtful)

@@ -28,14 +28,10 @@ STEPS = replace(APPROACH, accept=0.05, straight=0.06, settle=1.0, rest=0.3)
 
 
 async def approach(context: Context, navigator: GoTo, target: PlanarPose) -> None:
-    """Go straight to a pose in the odometry's frame, and stand, there or after `TIMEOUT`.
+    """Go straight to `target`, a pose of base_link in the odometry's frame, and stand, there or after `TIMEOUT`.
 
-    Args:
-        navigator: learns with every approach how these legs stop.
-        target: where base_link shall be.
-
-    Raises:
-        StageFailed: the odometry has fallen silent; the robot stands.
+    The `navigator` learns with every approach how these legs stop. Raises StageFailed: the odometry has fallen silent;
+    the robot stands.
     """
     context.release_arms()  # none is drawn to where it was
     navigator.start(target)

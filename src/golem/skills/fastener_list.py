@@ -52,11 +52,8 @@ class Listed:
 def read_list(path: Path, containers: Collection[str]) -> list[Listed]:
     """Read a CSV file with `class`, `x`, `y`, `z` and, if given, the other columns of `COLUMNS`; `loose` is 1 or 0.
 
-    Args:
-        containers: classes of what fasteners are put into, which may be listed, too.
-
-    Raises:
-        ConfigError: it cannot be read, is empty or too long, has a row twice, in another frame or of an unknown class.
+    Classes of `containers`, which fasteners are put into, may be listed, too. Raises ConfigError: it cannot be read, is
+    empty or too long, has a row twice, in another frame or of an unknown class.
     """
     try:
         if path.stat().st_size > SIZE:

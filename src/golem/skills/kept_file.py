@@ -24,14 +24,10 @@ class KeptFileConfig:
 
 
 def check_file_name(name: str, ending: str = "") -> None:
-    """Check the name of a file that a goal asks for; the empty one asks for none.
+    """Check the name of a file with an `ending`, such as `".json"`, that a goal asks for; the empty one asks for none.
 
     A goal may come from anybody on the domain, so it may not lead out of the folder of the skill. Raises ConfigError:
     it is no plain name, or ends otherwise.
-
-    Args:
-        name: as the goal has it.
-        ending: what it ends in, e.g. `".json"`.
     """
     if name and not (name.endswith(ending) and _PLAIN.fullmatch(name.removesuffix(ending))):
         ends = f" and '{ending}' at the end" if ending else " and no ending"

@@ -35,14 +35,9 @@ def pack_picture(
     robot: PlanarPose,
     gantry: Array | None,
 ) -> NDArray[np.uint8]:
-    """Return (height, width, 3) RGB.
+    """Return (height, width, 3) RGB of at least one fastener, of trays, and of the stops in their order.
 
-    Args:
-        fasteners: all of the list, at least one.
-        trays: what else is listed.
-        stops: of the plan, in order.
-        robot: base_link in the pack frame.
-        gantry: (2,) where it works in the pack frame [m], or None.
+    The `robot` is base_link in the pack frame, `gantry` (2,) is where it works there [m], or None.
     """
     places = np.array([one.place[:2] for one in fasteners])
     low, high = places.min(axis=0) - MARGIN, places.max(axis=0) + MARGIN

@@ -30,12 +30,9 @@ from golem.types import SIDES, Array, LocalizedObject, Side
 
 
 def reached_first(context: Context, side: Side, grasps: Sequence[Grasp], before: float) -> list[Grasp]:
-    """Return the same `grasps`, first those that an arm reaches with the least turn of the torso.
+    """Return `grasps`, best first, in another order: first those that the arm reaches with the least turn of the torso.
 
-    Args:
-        context: where the arms are.
-        grasps: best first.
-        before: distance from a grasp, along its approach, from which the hand comes [m].
+    The hand comes along the approach, from `before` the grasp [m].
     """
     ik, q = QuickIK(), context.commanded_joints
     T = np.linalg.inv(context.T_odom_base)
@@ -66,10 +63,7 @@ TOP, FORWARD = "top", "forward"
 class Take:
     """Grasp a thing by its name where it stands, lift it, and hold it.
 
-    Stages (see `Skill`): `detect`, `approach`, `reach`, `grasp`, `lift`, `done`.
-
-    Attributes:
-        force: what each finger is told to press with [N].
+    Stages (see `Skill`): `detect`, `approach`, `reach`, `grasp`, `lift`, `done`. Each finger presses with `force` [N].
     """
 
     Goal, Result = TakeGoal, TakeReport

@@ -73,10 +73,8 @@ class ContactSense:
     eq. 12), r = F(s) (tau - M(q) a - C(q, v) v - g(q)) with one low pass F(s) for all that is measured: of a
     low-passed speed the rate is known without differentiating. The arm hangs on the torso, whose IMU says how that is
     accelerated and turned, gravity included. A blow is felt before a motor gives way. Dry friction that a push does
-    not overcome hides it: a joint that sticks tells its motor nothing.
-
-    Attributes:
-        change: (6,) the wrench of the hand on the world since before the touch, in its grasp frame [N, N m].
+    not overcome hides it: a joint that sticks tells its motor nothing. Where it is `touching`, `change` (6,) is the
+    wrench of the hand on the world since before the touch, in its grasp frame [N, N m].
     """
 
     def __init__(self, side: Side) -> None:

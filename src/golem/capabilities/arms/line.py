@@ -38,19 +38,10 @@ class Line:
         a_max: float = 1.0,
         alpha_max: float = 4.0,
     ) -> None:
-        """Plan the profile.
+        """Plan the profile from `T_start` to `T_goal`, (4, 4) each, in one frame.
 
-        Args:
-            T_start: (4, 4) pose of the moved frame at the start.
-            T_goal: (4, 4) pose at the end, in the same frame.
-            v_max: speed limit [m/s].
-            w_max: rate of turn limit [rad/s].
-            a_max: acceleration limit [m/s^2].
-            alpha_max: angular acceleration limit [rad/s^2].
-
-        Raises:
-            TargetError: a pose is not a finite rigid transform.
-            ConfigError: a limit is not positive.
+        Its limits are those of speed [m/s], rate of turn [rad/s] and the two accelerations [m/s^2, rad/s^2].
+        Raises TargetError: a pose is not a finite rigid transform; ConfigError: a limit is not positive.
         """
         if not min(v_max, w_max, a_max, alpha_max) > 0.0:
             raise ConfigError("The limits of a line (v_max, w_max, a_max, alpha_max) must be positive.")

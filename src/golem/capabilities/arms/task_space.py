@@ -102,7 +102,7 @@ _POSITIVE = (
 
 
 class TaskSpaceController(ABC):
-    """Integrates the joint steps that a subclass solves for; see `UpperBody` for the contract.
+    """Integrates the joint steps that a subclass solves for; see `UpperBody` and `HasWaist` for the contracts.
 
     Attributes:
         task: its memory, which a subclass reads; see `task_kernel.IkMemory`.
@@ -154,10 +154,7 @@ class TaskSpaceController(ABC):
     def solve(self, dt: float) -> Array | None:
         """Return the joint step (15,) that serves the `wanted` palms of `task` best [rad]; None if none is found.
 
-        The program stands in `task`: `residual`, `below` and `above`, `state[LAMBDA]`, and H and f of it all.
-
-        Args:
-            dt: length of the tick [s].
+        The program of a tick of `dt` [s] stands in `task`: `residual`, `below`, `above`, `state[LAMBDA]`, H and f.
         """
 
     @property
@@ -173,7 +170,6 @@ class TaskSpaceController(ABC):
         self._move(np.clip(check_joints("The posture to start from", q)[UPPER], *self._kinematics.stops))
 
     def turn_waist(self, angle: float | None) -> None:
-        """Prefer `angle` [rad] for the waist; see `HasWaist`."""
         wanted = posture(self.config.posture)[0] if angle is None else angle
         self.rest[0] = np.clip(wanted, self.lower[0], self.upper[0])
 

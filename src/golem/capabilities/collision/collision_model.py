@@ -49,15 +49,11 @@ class CollisionModel:
     def __init__(
         self, robot: SphereRobot, joints: Sequence[str] | None = None, held: Mapping[str, float] | None = None
     ) -> None:
-        """Lay out the tables; a few milliseconds.
+        """Lay out the tables; a few milliseconds. Raises ConfigError: no joint of that name, or a name occurs twice.
 
         Args:
-            robot: spheres.
             joints: those that `q` moves, in its order; None for all, in the order of the links.
             held: position of other joints [rad or m]; zero where none is given.
-
-        Raises:
-            ConfigError: the robot has no joint of that name, or a name occurs twice.
         """
         every = joint_names(robot.links)
         self.joints = tuple(every if joints is None else joints)

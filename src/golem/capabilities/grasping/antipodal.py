@@ -101,18 +101,13 @@ class AntipodalConfig:
 
 
 class Antipodal(OpenLoop):
-    """Grasps on pairs of points that hold by friction, free of what the cloud shows; see `GraspMethod`.
-
-    Attributes:
-        latency: declared time of a proposal [s].
-    """
+    """Grasps on pairs of points that hold by friction, free of what the cloud shows; see `GraspMethod`."""
 
     def __init__(self, config: AntipodalConfig | None = None) -> None:
         self.config = config or AntipodalConfig()
         self.latency = self.config.latency
 
     def propose(self, target: LocalizedObject, scene: Array, gripper: Gripper) -> list[Grasp]:
-        """Return grasps, best first; see `GraspMethod`. Where the cloud holds no object there is none."""
         check_finite("the object's position", target.position)
         c = self.config
         down = gripper.approach if gripper.approach[2] < -ACROSS else None
@@ -299,13 +294,7 @@ class Antipodal(OpenLoop):
 
 
 def _middle_height(cloud: Array, scene: Array, approach: Array) -> float:
-    """Return the height of the middle of a thing [m]: a hand that comes from above sees no more than its top.
-
-    Args:
-        cloud: (n, 3) points of the thing.
-        scene: (m, 3) points around it.
-        approach: (3,) unit vector along which the hand comes.
-    """
+    """Return the height of the middle of a thing [m]: a hand that comes from above sees no more than its top."""
     low, high = np.quantile(cloud[:, 2], (0.02, 0.98)).tolist()
     if approach[2] < -ACROSS:
         off = np.linalg.norm(scene[:, :2] - cloud[:, :2].mean(axis=0), axis=1)

@@ -72,19 +72,14 @@ def grasp_depth(target: LocalizedObject, depth: float, clearance: float) -> floa
 
 
 class Centroid(OpenLoop):
-    """One grasp on the object's centre, along the approach that the task wants: straight down, or forward.
+    """One grasp on the object's centre, along the approach that the task wants, down or forward; see `GraspMethod`."""
 
-    Attributes:
-        latency: none: a proposal takes a few microseconds.
-    """
-
-    latency = 0.0
+    latency = 0.0  # a proposal takes a few microseconds
 
     def __init__(self, config: CentroidConfig | None = None) -> None:
         self.config = config or CentroidConfig()
 
     def propose(self, target: LocalizedObject, scene: Array, gripper: Gripper) -> list[Grasp]:
-        """Return the one grasp; see `GraspMethod`."""
         check_finite("the object's position", target.position)
         down = gripper.approach[2] < -ACROSS
         depth = grasp_depth(target, self.config.depth, self.config.clearance) if down else self.config.reach

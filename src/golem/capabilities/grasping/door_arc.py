@@ -84,13 +84,10 @@ def _extent(strips: set[int], step: int) -> float:
 
 
 class DoorArc:
-    """The circle about an upright hinge on which a held handle moves.
+    """The circle about an upright hinge, by now at `hinge` (2,) [m], on which a held handle moves.
 
     Least squares on the places of the hand, each as far from the hinge as all are in the mean, with what the camera
     said of the hinge as a prior. The first centimetres do not count: arm and fingers give until the seal lets go.
-
-    Attributes:
-        hinge: (2,) where the hinge is by now [m].
     """
 
     def __init__(self, start: Array, door: Door) -> None:

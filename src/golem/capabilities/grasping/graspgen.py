@@ -15,7 +15,7 @@ import numpy as np
 from golem.capabilities.grasping.antipodal import upright
 from golem.capabilities.grasping.base import Grasp, Gripper, OpenLoop
 from golem.capabilities.grasping.object_cloud import MIN_POINTS, object_points, thinned
-from golem.errors import MissingExtra, ServiceUnavailable, shorten
+from golem.errors import ServiceUnavailable, needs, shorten
 from golem.finite import check_finite
 from golem.options import require
 from golem.types import Array, LocalizedObject
@@ -62,11 +62,7 @@ class GraspGenConfig:
 
 
 class GraspGen(OpenLoop):
-    """Grasps of a GraspGen server, in the order of its confidences; see `GraspMethod`.
-
-    Attributes:
-        latency: declared time of a proposal [s].
-    """
+    """Grasps of a GraspGen server, in the order of its confidences; see `GraspMethod`."""
 
     def __init__(self, config: GraspGenConfig | None = None) -> None:
         """Take the options; the server is asked when a grasp is. Raises MissingExtra: a package it needs is absent."""
@@ -183,9 +179,7 @@ def _unpack_array(value: dict[Any, Any]) -> object:
 
 
 def _packages() -> tuple[Any, Any]:
-    try:
+    with needs("", "graspgen"):
         import msgpack
         import zmq
-    except ImportError as error:
-        raise MissingExtra(error.name or "pyzmq", "graspgen") from error
     return zmq, msgpack

@@ -66,11 +66,7 @@ class LookAndMoveConfig(VisualServoConfig):
 
 
 class StopAndGo:
-    """A servo law that asks another one once per cycle, and sends the hand a part of the way; see `ServoLaw`.
-
-    Attributes:
-        patience: of the other law [s].
-    """
+    """A servo law that asks another one once per cycle, and sends the hand a part of the way; see `ServoLaw`."""
 
     def __init__(self, config: LookAndMoveConfig, law: ServoLaw, t: float) -> None:
         """Begin with a look at time `t` [s]."""

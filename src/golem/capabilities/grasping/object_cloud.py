@@ -71,8 +71,7 @@ def _width(points: Array) -> float:
 def support_plane(points: Array, position: Array, seed: int = 0) -> tuple[Array, float] | None:
     """Return the plane that most points (n, 3) lie on and `position` (3,) does not; None where there is none.
 
-    Returns:
-        its (3,) unit normal, which looks to the side of `position`, and its distance from the origin along it [m].
+    Its (3,) unit normal looks to the side of `position`; with it comes its distance from the origin along that [m].
     """
     rng = np.random.default_rng(seed)
     a, b, c = points[rng.integers(0, len(points), (3, HYPOTHESES))]
@@ -182,13 +181,10 @@ def height_above_ground(sighting: LocalizedObject) -> float | None:
 
 
 def ground_plane(sighting: LocalizedObject) -> tuple[Array, float] | None:
-    """Return the ground around the object and how high its top is above it; None where it cannot be told.
+    """Return the ground's upward unit normal (3,), and how high an object's top is above it [m]; None: unknown.
 
     A least-squares plane z = a x + b y + c through the points below the object's top, fitted twice: the second time
     without what lies off the first plane.
-
-    Returns:
-        the (3,) unit normal of the plane, upwards, and the height of the object's top above it [m].
     """
     points = sighting.points[sighting.points[:, 2] < sighting.position[2] - STANDS_PROUD]
     normal, height = None, 0.0

@@ -73,9 +73,7 @@ class PolicyGrasp(Centroid):
     def __init__(self, config: PolicyGraspConfig | None = None) -> None:
         """Take the options; the policy is asked when the hand is above the object.
 
-        Raises:
-            ConfigError: its file is no policy.
-            MissingExtra: the extra `policy` is not installed.
+        Raises ConfigError: its file is no policy; MissingExtra: the extra `policy` is not installed.
         """
         super().__init__()
         self._policy, self._options = open_policy(config or PolicyGraspConfig())

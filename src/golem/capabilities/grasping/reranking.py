@@ -89,10 +89,7 @@ class Reranking:
     """The grasps of another method, first those that the arm can do and of them what suits it; see `GraspMethod`.
 
     Scores of those that the arm can do are from 1 to 2, those of the others from 0 to 1. The others follow in the
-    proposer's order.
-
-    Attributes:
-        latency: that of both together [s].
+    proposer's order. The latency is that of both together.
     """
 
     def __init__(self, config: RerankingConfig | None = None) -> None:
@@ -105,7 +102,6 @@ class Reranking:
         self._ik, self._robot = QuickIK(), PlanningRobot()
 
     def propose(self, target: LocalizedObject, scene: Array, gripper: Gripper) -> list[Grasp]:
-        """Return all proposals, first those that can be reached and are free, best first; see `GraspMethod`."""
         check_finite("the object's position", target.position)
         grasps = self._proposer.propose(target, scene, gripper)
         if not grasps:
@@ -142,14 +138,7 @@ class Reranking:
     def _comfort(
         self, grasps: Sequence[Grasp], gripper: Gripper, q: Array, space: JointSpace, T_base_odom: Array
     ) -> dict[int, float]:
-        """Return the comfort, 0 to 1, of those `grasps` that the arm can do with the least turn of the torso, if any.
-
-        Args:
-            grasps: best first.
-            q: (15,) where the joints are [rad].
-            space: the postures that are free.
-            T_base_odom: (4, 4) pose of odom in base_link.
-        """
+        """Return the comfort, 0 to 1, of those `grasps` that the arm can do with the least turn of the torso."""
         named = [POSTURES["forward"], POSTURES["ready"]]
         if gripper.approach[2] < -ACROSS:
             named.reverse()

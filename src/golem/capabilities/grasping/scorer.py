@@ -103,11 +103,7 @@ class ScorerConfig:
 
 
 class Scorer(OpenLoop):
-    """Antipodal grasps, the one that most probably holds first; see `GraspMethod`.
-
-    Attributes:
-        latency: of proposals and network together [s].
-    """
+    """Antipodal grasps, with the probability that they hold as score; see `GraspMethod`."""
 
     def __init__(self, config: ScorerConfig | None = None) -> None:
         """Load the network. Raises ConfigError: the weights cannot be read, or are of another network."""
@@ -117,7 +113,6 @@ class Scorer(OpenLoop):
         self.latency = self._proposer.latency + self.config.latency
 
     def propose(self, target: LocalizedObject, scene: Array, gripper: Gripper) -> list[Grasp]:
-        """Return the antipodal grasps, best first, with the probability that they hold as score; see `GraspMethod`."""
         return self.scored(target, self._proposer.propose(target, scene, gripper))
 
     def scored(self, target: LocalizedObject, grasps: list[Grasp]) -> list[Grasp]:

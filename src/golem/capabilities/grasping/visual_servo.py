@@ -85,20 +85,12 @@ class ServoLawConfig:
 
 
 class CentroidServo:
-    """Kalman filter on a resting object, and a funnel that trades height against lateral error."""
+    """Kalman filter on a resting object, and a funnel that trades height against lateral error; see `ServoLaw`."""
 
     def __init__(
         self, config: ServoLawConfig, centroid: CentroidConfig, target: LocalizedObject, yaw: float, t: float
     ) -> None:
-        """Start at time `t` [s] from what the head camera saw.
-
-        Args:
-            config: noise, gates and patience.
-            centroid: where around the object the fingers close.
-            target: the object as the head camera saw it.
-            yaw: heading of the gripper's x axis [rad].
-            t: start time [s].
-        """
+        """Start at time `t` [s] from the `target` as the head camera saw it; `yaw` is of the gripper's x axis [rad]."""
         self.label, self.patience = target.label, config.patience
         self._config = config
         self._centroid = centroid
@@ -122,7 +114,6 @@ class CentroidServo:
         self._best_at = t
 
     def step(self, t: float, sightings: list[LocalizedObject] | None, T_odom_gripper: Array) -> ServoStep:
-        """Advance; see `ServoLaw`."""
         c = self._config
         start = self._start = T_odom_gripper[:2, 3].copy() if self._start is None else self._start
         self._variance = self._variance + c.drift**2 * (t - self._t)
@@ -253,11 +244,7 @@ class VisualServoConfig:
 
 
 class VisualServo:
-    """Centroid grasp, refined by the palm camera at image rate.
-
-    Attributes:
-        latency: that of `Centroid`.
-    """
+    """Centroid grasp, refined by the palm camera at image rate; see `GraspMethod`."""
 
     latency = Centroid.latency
 
@@ -266,11 +253,9 @@ class VisualServo:
         self._coarse = Centroid(self.config.centroid)
 
     def propose(self, target: LocalizedObject, scene: Array, gripper: Gripper) -> list[Grasp]:
-        """Return the centroid grasp, to start from; see `GraspMethod`."""
         return self._coarse.propose(target, scene, gripper)
 
     def servo(self, target: LocalizedObject, grasp: Grasp, t: float) -> ServoLaw:
-        """Return the loop that refines `grasp`; see `GraspMethod`."""
         x_axis = grasp.T_odom_gripper[:3, 0]
         yaw = float(np.arctan2(x_axis[1], x_axis[0]))
         return CentroidServo(self.config.servo, self.config.centroid, target, yaw, t)

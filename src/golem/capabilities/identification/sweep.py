@@ -37,7 +37,6 @@ class LegSweep:
     _t, _start = 0.0, MIDDLE
 
     def reset(self, state: LowState) -> None:
-        """Start from the measured joints of `state`."""
         self._t, self._start = 0.0, state.q.copy()
 
     def step(self, state: LowState, base: BaseEstimate, motion: LocomotionCommand, dt: float) -> LegCommand:
@@ -52,7 +51,6 @@ class ArmSweep:
     _t, _start = 0.0, MIDDLE
 
     def reset(self, q: Array) -> None:
-        """Start from the measured joints `q` (27,) [rad]."""
         self._t, self._start = 0.0, q.copy()
 
     def step(self, targets_left: Array | None, targets_right: Array | None, q_measured: Array, dt: float) -> ArmCommand:

@@ -167,7 +167,6 @@ class Gait:
             commanded: (*shape,) whether a twist other than zero is asked for.
             capture: (*shape, 2) capture point relative to the middle of the feet, x ahead, y left [m].
             misplaced: (*shape,) how far the feet are from where they belong relative to each other [m].
-            dt: time since the previous tick [s].
         """
         points = np.ascontiguousarray(capture).reshape(-1, 2)
         _step_gaits(self.memory.reshape(-1), self.options, np.ravel(commanded), points, np.ravel(misplaced), dt)

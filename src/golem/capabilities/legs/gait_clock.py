@@ -127,7 +127,6 @@ class StopPredictor:
             feet: (2, 4, 4) poses of the soles in base_link, left and right.
             contact: (2,) probability that each foot carries load.
             moving: whether the robot walks or steps.
-            dt: time since the previous step [s].
         """
         here, prints = np.empty(3), np.empty((2, 3))
         planar(base, here)
@@ -250,13 +249,7 @@ class GaitClock:
         seen["stance"] = (soles[0] - soles[1])[:2]
 
     def step(self, state: LowState, base: BaseEstimate, twist: Twist, dt: float) -> Array:
-        """Advance by `dt` [s]; return what to command so that the robot moves at `twist`: (3,), vx, vy, wz.
-
-        Args:
-            base: estimated pose and velocity of base_link.
-            twist: what the robot shall move at.
-            dt: time since the previous step [s].
-        """
+        """Advance by `dt` [s]; return what to command so that the robot moves at `twist`: (3,), vx, vy, wz."""
         seen = self._seen
         seen["q"], seen["waist_rate"], seen["gyro"] = state.q, state.dq[TORSO], state.imu.gyro
         seen["base"], seen["velocity"], seen["contact"] = base.T_odom_base, base.velocity, base.contact

@@ -25,11 +25,7 @@ from golem.types import LEGS, Array, BaseEstimate, LowState
 
 
 class CommandBlender:
-    """Mixes the commands of the controller that was in charge with those of the one that is, for a while.
-
-    Attributes:
-        active: whether commands are being mixed; if not, `step` changes nothing.
-    """
+    """Mixes the commands of the controller that was in charge with those of the one that is, while it is `active`."""
 
     def __init__(self, duration: float) -> None:
         """Take `duration` [s] from one controller to the next, unless `begin` says otherwise."""
@@ -127,10 +123,9 @@ class Handover:
     """
 
     def __init__(self, config: HandoverConfig, onboard: Onboard | None = None) -> None:
-        """Make both controllers. Raises ConfigError, ModuleFault: one of them cannot be made; see `registry.create`.
+        """Make both controllers; `onboard` is for one that speaks to the robot's own computer.
 
-        Args:
-            onboard: the robot's own computer, for a controller that speaks to it.
+        Raises ConfigError, ModuleFault: one of them cannot be made; see `registry.create`.
         """
         self.config = config
         parts = (config.walk, config.stand)
@@ -155,7 +150,6 @@ class Handover:
         self._active.reset(state)
 
     def step(self, state: LowState, base: BaseEstimate, motion: LocomotionCommand, dt: float) -> LegCommand:
-        """Run the controller in charge, after a change of hands where one is due; see `LowerBody.step`."""
         self._healthy = self._healthy + dt if self._is_healthy(state, base) else 0.0
         if self.walking and self._is_shoved(base, motion):
             self._catch(state)

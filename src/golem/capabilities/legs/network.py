@@ -46,6 +46,7 @@ class OnnxNetwork:
     """A network run by onnxruntime: an input (1, n) or (n,), an output of actions.
 
     A recurrent one has an input more for each part of its state, and an output of the same shape, in the same order.
+    See `Network`.
     """
 
     def __init__(self, path: Path, size: int, actions: int = ACTIONS) -> None:
@@ -86,7 +87,6 @@ class OnnxNetwork:
             self._binding.bind_output(output.name, "cpu", 0, np.float32, values.shape, values.ctypes.data)
 
     def reset(self) -> None:
-        """Clear its state, if it has one."""
         for state in self._states:
             state[...] = 0.0
 
@@ -113,7 +113,7 @@ class TorchScriptNetwork:
     """A TorchScript module that takes (1, n) and returns (1, 12), or more actions.
 
     A module with a memory of its own clears it in a method `reset_memory`; without one its buffers are put back to what
-    they were in the file. Loading one sets torch to one thread for the whole process.
+    they were in the file. Loading one sets torch to one thread for the whole process. See `Network`.
     """
 
     def __init__(self, path: Path, size: int, actions: int = ACTIONS) -> None:
@@ -137,7 +137,6 @@ class TorchScriptNetwork:
         self.reset()
 
     def reset(self) -> None:
-        """Clear the module's memory."""
         self._forget()
 
     def __call__(self, observation: Float32) -> Float32:

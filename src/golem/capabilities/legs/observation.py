@@ -223,10 +223,7 @@ class ObservationLayout:
     def look(self, state: LowState, base: BaseEstimate, motion: LocomotionCommand, action: Array) -> Array:
         """Return the (size,) observation of one robot: all about the base as estimated, its rate by the torso IMU.
 
-        Args:
-            base: estimated pose and velocity of base_link.
-            motion: what the base layer asks for.
-            action: (12,) or (27,) the policy's last action, by motor.
+        The policy's last `action` is (12,) or (27,), by motor.
         """
         m, twist = self._measured, motion.twist
         m["q"], m["dq"], m["gyro"] = state.q, state.dq, state.imu.gyro

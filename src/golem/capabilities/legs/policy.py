@@ -70,11 +70,9 @@ class Policy:
     """
 
     def __init__(self, config: PolicyConfig) -> None:
-        """Load description and network.
+        """Load description and network. Raises MissingExtra: a network of TorchScript needs torch, which is absent.
 
-        Raises:
-            ConfigError: a file is absent or says something it cannot mean, or the two do not fit each other.
-            MissingExtra: the network is a TorchScript file, and torch is not installed.
+        Raises ConfigError: a file is absent or says something it cannot mean, or the two do not fit each other.
         """
         passport = read_passport(config.file, config.network)
         description, path = passport.description, passport.network

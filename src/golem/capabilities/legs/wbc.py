@@ -223,14 +223,9 @@ class Wbc:
         return out
 
     def _advance(self, q: Array, height: float, wish: float, contact: float, dt: float) -> Array:
-        """Move the wished height to `wish` and the share of the torques to 1; return the posture to hold.
+        """Move the wished height to `wish` [m], and the share of the torques to 1; return the posture to hold.
 
-        Args:
-            q: (12,) measured leg joints [rad].
-            height: of the pelvis above the soles [m].
-            wish: the height that it shall come to [m].
-            contact: probability of a contact, both feet summed.
-            dt: time since the previous tick [s].
+        The pelvis is at `height` above the soles [m]; `contact` is the probability of one, both feet summed.
         """
         loaded = contact > 0.5
         if self._hold is None:

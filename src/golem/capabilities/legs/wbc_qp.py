@@ -169,13 +169,9 @@ class StanceProgram:
     """Assembles and solves the program. A sole pushes at `corners` (4, 3), from its centre, in the foot's axes [m]."""
 
     def __init__(self, torque: Array, friction: float, margin: float, weights: QpWeights) -> None:
-        """Lay the constant parts out.
+        """Lay the constant parts out, for motors that give up to `torque` (12,) [N m] and soles with `friction`.
 
-        Args:
-            torque: (12,) bounds of the leg motors [N m].
-            friction: coefficient of the soles.
-            margin: how far the corners stay from the edges of the sole [m].
-            weights: of the tasks.
+        The corners stay by `margin` from the edges of the sole [m].
         """
         x, y = _HALF - margin
         self.corners: Array = np.array([[x, y, 0.0], [x, -y, 0.0], [-x, y, 0.0], [-x, -y, 0.0]])

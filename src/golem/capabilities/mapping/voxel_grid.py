@@ -212,8 +212,7 @@ class GridConfig:
 class VoxelGridMapper:
     """Voxels of what was seen, and the map of the floor from them; see `Mapper`. A scan costs some milliseconds.
 
-    Attributes:
-        before: the map from before; None where the options name none.
+    The map from before is `before`; None where the options name none.
     """
 
     rate = 2.0

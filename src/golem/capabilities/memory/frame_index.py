@@ -43,12 +43,10 @@ class ImageTextEncoder:
         self._words: OrderedDict[str, Array] = OrderedDict()
 
     def frame(self, observation: Observation) -> Array:
-        """Return the (d,) unit vector of a frame's image."""
         given = self._processor(images=observation.frame.rgb, return_tensors="pt")
         return self._vector(self._model.get_image_features, given)
 
     def text(self, text: str) -> Array:
-        """Return the (d,) unit vector of words."""
         words = " ".join(text.lower().replace("_", " ").split())
         if words not in self._words:
             given = self._processor(
@@ -85,7 +83,7 @@ class BagOfLabels:
     """What a localizer found in a frame, as a vector with a component for each label: no network is needed.
 
     A label weighs by its scores and the root of the share of the image that its boxes take. Labels get a component
-    when they are met first, up to `SIZE`.
+    when they are met first, up to `SIZE`. See `FrameEncoder`.
     """
 
     SIZE = 256
@@ -94,7 +92,6 @@ class BagOfLabels:
         self._component: dict[str, int] = {}
 
     def frame(self, observation: Observation) -> Array:
-        """Return the (d,) unit vector of a frame; zero where nothing is in it."""
         vector = np.zeros(self.SIZE)
         area = observation.frame.info.width * observation.frame.info.height
         for found in observation.objects:
@@ -105,7 +102,6 @@ class BagOfLabels:
         return _unit(vector)
 
     def text(self, text: str) -> Array:
-        """Return the (d,) unit vector of words; zero where none of the labels met so far answers to them."""
         vector = np.zeros(self.SIZE)
         for label, score in label_scores(text, self._component).items():
             if self._component[label] < self.SIZE:
@@ -159,7 +155,7 @@ class FrameIndexConfig:
 
 
 class FrameIndex:
-    """Frames by what they look like."""
+    """Frames by what they look like; see `Memory`."""
 
     def __init__(self, config: FrameIndexConfig | None = None) -> None:
         self._config = config or FrameIndexConfig()
@@ -171,7 +167,6 @@ class FrameIndex:
         self.last = -math.inf
 
     def observe(self, observation: Observation) -> None:
-        """See `Memory.observe`."""
         check_observation(observation, self.last)
         self.last = observation.frame.t
         self._vectors.append(self._encoder.frame(observation))

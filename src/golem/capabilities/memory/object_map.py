@@ -207,7 +207,7 @@ class ObjectMapConfig:
 
 
 class ObjectMap:
-    """The objects that were seen, where they are, and where they were."""
+    """The objects that were seen, where they are, and where they were; see `Memory` and `HasPlaces`."""
 
     def __init__(self, config: ObjectMapConfig | None = None) -> None:
         """Open the memory. Raises MemoryFault: the file cannot be used."""
@@ -229,7 +229,6 @@ class ObjectMap:
         return len(self._records)
 
     def observe(self, observation: Observation) -> None:
-        """See `Memory.observe`."""
         check_observation(observation, self.last)
         changed = self._match(observation) | self._miss(observation)
         removed = self._never_were() | self._bound()
@@ -329,7 +328,6 @@ class ObjectMap:
         return sorted(places, key=lambda p: (-p.score, -p.last_seen))[:limit]
 
     def places(self, limit: int) -> list[Place]:
-        """See `HasPlaces`."""
         found = [place for label in self._records.labels for place in self._places(label, 1.0, "anywhere", None, limit)]
         return sorted(found, key=lambda p: -p.last_seen)[:limit]
 
@@ -367,7 +365,6 @@ class ObjectMap:
         return list(islice(kept, limit))
 
     def forget(self, text: str) -> int:
-        """See `Memory.forget`."""
         check_query(text, "anywhere", None, 1)
         numbers = self._remove(
             int(self._records.numbers[row])
@@ -378,6 +375,5 @@ class ObjectMap:
         return len(numbers)
 
     def close(self) -> None:
-        """See `Memory.close`."""
         if self._file is not None:
             self._file.close()

@@ -185,30 +185,24 @@ class RerankedConfig:
 
 
 class PlaceJudge(Protocol):
-    """Puts proposed places into order."""
+    """Puts proposed places into order; takes looks in, forgets and ends as a `Memory` does."""
 
     @property
-    def last(self) -> float:
-        """Time of the newest look [s]; -inf before the first."""
-        ...
+    def last(self) -> float: ...
 
-    def observe(self, observation: Observation) -> None:
-        """Take a look in; see `Memory.observe`."""
+    def observe(self, observation: Observation) -> None: ...
 
     def order(self, text: str, when: When, at: float | None, proposed: Sequence[Place], limit: int) -> list[Place]:
         """Return those of the proposed places that answer, with what is known of their times, best first."""
         ...
 
-    def forget(self, text: str) -> int:
-        """See `Memory.forget`."""
-        ...
+    def forget(self, text: str) -> int: ...
 
-    def close(self) -> None:
-        """See `Memory.close`."""
+    def close(self) -> None: ...
 
 
 class ObjectJudge:
-    """Orders places by an `ObjectMap`."""
+    """Orders places by an `ObjectMap`; see `PlaceJudge`."""
 
     def __init__(self, config: RerankedConfig) -> None:
         """Open it. Raises MemoryFault: its file cannot be used."""
@@ -217,11 +211,9 @@ class ObjectJudge:
 
     @property
     def last(self) -> float:
-        """Time of the newest look [s]."""
         return self._objects.last
 
     def observe(self, observation: Observation) -> None:
-        """See `PlaceJudge`."""
         self._objects.observe(observation)
 
     def order(self, text: str, when: When, at: float | None, proposed: Sequence[Place], limit: int) -> list[Place]:
@@ -237,24 +229,17 @@ class ObjectJudge:
         return bool(np.linalg.norm(known.position[:2] - proposed.position[:2]) <= self._config.near)
 
     def forget(self, text: str) -> int:
-        """See `PlaceJudge`."""
         return self._objects.forget(text)
 
     def close(self) -> None:
-        """See `PlaceJudge`."""
         self._objects.close()
 
 
 class Reranked:
-    """Places of one memory in the order of another's evidence."""
+    """Places of one memory in the order of another's evidence; see `Memory`."""
 
     def __init__(self, config: RerankedConfig | None = None) -> None:
-        """Open both.
-
-        Raises:
-            MemoryFault: the file of the objects cannot be used.
-            ConfigError, MissingExtra: see `FrameIndex` and `PictureJudge`.
-        """
+        """Open both. Raises MemoryFault: no use of the objects' file; others as `FrameIndex` and `PictureJudge`."""
         self._config = c = config or RerankedConfig()
         make: Callable[[], Memory] = TopDownMap if c.proposer == "top_down_map" else lambda: FrameIndex(c.frames)
         self._proposer = make()
@@ -262,7 +247,6 @@ class Reranked:
         self.last = self._judge.last
 
     def observe(self, observation: Observation) -> None:
-        """See `Memory.observe`."""
         check_observation(observation, self.last)
         self._judge.observe(observation)
         self._proposer.observe(observation)
@@ -275,11 +259,9 @@ class Reranked:
         return self._judge.order(text, when, at, proposed, limit)
 
     def forget(self, text: str) -> int:
-        """See `Memory.forget`."""
         proposed = self._proposer.forget(text)
         return proposed if self._config.judge == "gemini" else self._judge.forget(text)
 
     def close(self) -> None:
-        """See `Memory.close`."""
         self._proposer.close()
         self._judge.close()

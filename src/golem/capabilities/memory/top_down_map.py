@@ -52,7 +52,7 @@ class _Cell:
 
 
 class TopDownMap:
-    """What is above each cell of the floor."""
+    """What is above each cell of the floor; see `Memory`."""
 
     def __init__(self, config: TopDownMapConfig | None = None) -> None:
         self._config = config or TopDownMapConfig()
@@ -60,7 +60,6 @@ class TopDownMap:
         self.last = -math.inf
 
     def observe(self, observation: Observation) -> None:
-        """See `Memory.observe`."""
         check_observation(observation, self.last)
         t = self.last = observation.frame.t
         for key in self._keys(scene_of(observation.frame)[::STRIDE]):

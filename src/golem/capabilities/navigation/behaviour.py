@@ -30,24 +30,22 @@ class Behaviour(Protocol):
         """Begin again at the next tick."""
 
 
-class Action:
+class Action(Behaviour):
     """A leaf that runs a function of the time since it began [s]."""
 
     def __init__(self, function: Callable[[float], BehaviourStatus]) -> None:
         self._function, self._t = function, 0.0
 
     def tick(self, dt: float) -> BehaviourStatus:
-        """Call the function; see `Behaviour`."""
         status = self._function(self._t)
         self._t = self._t + dt if status is BehaviourStatus.RUNNING else 0.0
         return status
 
     def reset(self) -> None:
-        """Begin again; see `Behaviour`."""
         self._t = 0.0
 
 
-class Composite:
+class Composite(Behaviour):
     """Ticks one child after the other, as long as each ends with `goes_on`."""
 
     goes_on: BehaviourStatus
@@ -56,7 +54,6 @@ class Composite:
         self._children, self._at = children, 0
 
     def tick(self, dt: float) -> BehaviourStatus:
-        """Tick the child whose turn it is; see `Behaviour`."""
         status = self._children[self._at].tick(dt)
         if status is self.goes_on and self._at + 1 < len(self._children):
             self._at += 1
@@ -66,7 +63,6 @@ class Composite:
         return status
 
     def reset(self) -> None:
-        """Begin again with the first child; see `Behaviour`."""
         self._at = 0
         for child in self._children:
             child.reset()

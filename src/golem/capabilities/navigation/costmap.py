@@ -58,12 +58,7 @@ class Costmap:
     """
 
     def __init__(self, grid: OccupancyGrid, points: Array, radius: float, config: CostmapConfig | None = None) -> None:
-        """Inflate the obstacles of a map and of a scan.
-
-        Args:
-            points: (n, 2) obstacles in the frame of the map that are not in it yet [m]; those beside it are left out.
-            radius: inscribed radius of the robot [m].
-        """
+        """Inflate obstacles of a map, and `points` (n, 2) in its frame [m], by the robot's inscribed `radius` [m]."""
         config = config or CostmapConfig()
         self.origin, self.resolution, self.shape = grid.origin, grid.resolution, grid.cells.shape
         full = grid.cells >= config.occupied

@@ -84,14 +84,10 @@ class GoToConfig:
 
 
 class GoTo:
-    """Follows the straight line to the goal; see `Navigator`.
-
-    Attributes:
-        latency: none: a step takes some 50 microseconds.
-    """
+    """Follows the straight line to the goal, and looks at neither map nor scan; see `Navigator`."""
 
     rate = 100.0
-    latency = 0.0
+    latency = 0.0  # a step takes some 50 microseconds
 
     def __init__(self, config: GoToConfig | None = None) -> None:
         self.config = config or GoToConfig()
@@ -104,7 +100,6 @@ class GoTo:
         self._forget()
 
     def step(self, inputs: NavInputs, dt: float) -> NavStep:
-        """Return the twist of this step; see `Navigator`. It looks at neither map nor scan."""
         pose, moving = inputs.pose, inputs.moving
         if self._goal is None:
             self._goal = pose

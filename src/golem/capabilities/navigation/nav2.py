@@ -73,15 +73,11 @@ class Nav2Config:
 
 
 class Nav2:
-    """Leaves the way to Nav2, and corrects where the robot stands at its end; see `Navigator`.
-
-    Attributes:
-        latency: none: Nav2 takes what it takes.
-    """
+    """Leaves the way to Nav2, and corrects where the robot stands at its end; see `Navigator`."""
 
     requires = ("scan",)
     rate = 50.0
-    latency = 0.0
+    latency = 0.0  # Nav2 takes what it takes
 
     def __init__(self, config: Nav2Config | None = None, nav2: Nav2Link | None = None) -> None:
         """Speak through `nav2`, which the stack supplies. Raises ConfigError: nobody supplied it."""
@@ -93,13 +89,11 @@ class Nav2:
         self._begin()
 
     def start(self, goal: PlanarPose) -> None:
-        """Give Nav2 a goal; see `Navigator`."""
         self._goal = goal
         self._begin()
         self._nav2.send(goal)
 
     def step(self, inputs: NavInputs, dt: float) -> NavStep:
-        """Return what Nav2's controller wants, or the step of the rest; see `Navigator`."""
         pose = inputs.pose
         check_finite("the pose", np.array([pose.x, pose.y, pose.yaw]))
         left = pose.to(self._goal)

@@ -33,12 +33,7 @@ class Surroundings:
     """
 
     def __init__(self, config: CostmapConfig, shy: float, ahead: float) -> None:
-        """Wait for a map.
-
-        Args:
-            shy: see `clearance` [m].
-            ahead: time for which the way of those who walk is kept free [s]; 0 takes everything for standing.
-        """
+        """Wait for a map; for `shy` [m] see `clearance`, and the way of those who walk is kept free for `ahead` [s]."""
         self._config, self._shy, self._ahead = config, shy, ahead
         self._movers = Movers()
         self.forget()

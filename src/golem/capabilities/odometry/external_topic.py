@@ -79,7 +79,6 @@ class ExternalTopic(Ignores):
         return f"Nothing has come on /Odometry for {age:.1f} s." if age > self.config.silent_after else ""
 
     def add_legs(self, legs: LegOdometry) -> None:
-        """Take the time and the angle of the waist; see `LidarOdometry`."""
         if np.isfinite([legs.t, legs.waist]).all():
             self._waist, self._now = legs.waist, legs.t
 

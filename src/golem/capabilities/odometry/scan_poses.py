@@ -18,7 +18,7 @@ LOST_AFTER = 1.0
 
 
 class ScanPoses(base.Ignores):
-    """An odometry that says one pose per scan, of its end, and keeps it until the next; a subclass registers scans."""
+    """A `LidarOdometry` that says one pose per scan, of its end, and keeps it until the next; a subclass registers."""
 
     why = "No scan has come yet."
 
@@ -31,12 +31,10 @@ class ScanPoses(base.Ignores):
         self.why = "No scan has come yet."
 
     def add_legs(self, legs: LegOdometry) -> None:
-        """Take the angle of the waist; see `LidarOdometry`."""
         if math.isfinite(legs.waist):
             self._waist = legs.waist
 
     def estimate(self) -> base.OdometryEstimate | None:
-        """Return where the robot was at the end of the newest scan; see `LidarOdometry`."""
         return self._newest
 
     def take(self, scan: LidarScan) -> tuple[Array, Array] | None:

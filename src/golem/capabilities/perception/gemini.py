@@ -60,8 +60,7 @@ class Gemini:
     def locate(self, frame: RgbdImage, labels: Sequence[str]) -> list[LocalizedObject]:
         """Return what the model sees of `labels`; see `Localizer`.
 
-        Raises:
-            ServiceUnavailable: no answer in time, a refusal, nonsense, or the budget of questions is used up.
+        Raises ServiceUnavailable: no answer in time, a refusal, nonsense, or the budget of questions is used up.
         """
         if not labels or not (np.isfinite(frame.depth) & (frame.depth > 0.0)).any():
             return []
@@ -81,13 +80,8 @@ def _question(labels: Sequence[str]) -> str:
 def read_boxes(text: str, labels: Sequence[str], size: tuple[int, int]) -> list[Box]:
     """Return the boxes that the model's words hold: JSON, bare or fenced, a list or one object.
 
-    Entries of other labels, and those that are no box within the image, are left out.
-
-    Args:
-        size: height and width of the image [px].
-
-    Raises:
-        ServiceUnavailable: they hold no JSON.
+    Entries of other labels, and those that are no box within the image, of height and width `size` [px], are left out.
+    Raises ServiceUnavailable: they hold no JSON.
     """
     said = read_json(text)
     entries = cast("list[Any]", said if isinstance(said, list) else [said])

@@ -66,15 +66,12 @@ class GeminiService:
     def __init__(
         self, config: GeminiServiceConfig, who: str, instead: str, sleep: Callable[[float], None] = time.sleep
     ) -> None:
-        """Take the key from the environment.
+        """Take the key from the environment. Raises ConfigError: there is no key.
 
         Args:
             who: what needs the key, in the sentence that misses it.
             instead: what helps where there is none.
             sleep: lets time pass between two tries [s].
-
-        Raises:
-            ConfigError: there is no key.
         """
         self._config, self._sleep = config, sleep
         self.asked = 0
@@ -88,10 +85,8 @@ class GeminiService:
     def ask(self, parts: Sequence[Mapping[str, Any]]) -> str:
         """Return the model's words, which are to be JSON, for `parts`; asked again where that may help.
 
-        No thinking and a low temperature, for speed.
-
-        Raises:
-            ServiceUnavailable: no answer in time, a refusal, nonsense, or the budget of questions is used up.
+        No thinking and a low temperature, for speed. Raises ServiceUnavailable: no answer in time, a refusal, nonsense,
+        or the budget of questions is used up.
         """
         body = json.dumps(
             {

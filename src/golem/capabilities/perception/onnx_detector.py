@@ -40,7 +40,7 @@ class OnnxDetectorConfig:
 
 
 class OnnxDetector:
-    """Parts of a pack, and what stands in a kitchen, in images of any size; deterministic."""
+    """Parts of a pack, and what stands in a kitchen, in images of any size; deterministic. See `Localizer`."""
 
     def __init__(self, config: OnnxDetectorConfig | None = None) -> None:
         """Load the network. Raises ConfigError: it is none of ours, or the threshold is not between 0 and 1."""
@@ -68,14 +68,11 @@ class OnnxDetector:
             ) from error
 
     def detect(self, image: NDArray[np.uint8], labels: Sequence[str] | None = None) -> list[Detection]:
-        """Return the detections in an image, best first.
+        """Return the detections in an image, best first. Raises ConfigError: unknown label.
 
         Args:
             image: (height, width, 3) RGB.
             labels: classes to return; all if absent.
-
-        Raises:
-            ConfigError: unknown label.
         """
         wanted = set(self.classes if labels is None else labels)
         for label in sorted(wanted - set(self.classes)):
@@ -90,7 +87,6 @@ class OnnxDetector:
         return sorted(found, key=lambda d: -d.score)
 
     def locate(self, frame: RgbdImage, labels: Sequence[str]) -> list[LocalizedObject]:
-        """Return what is seen of `labels`; see `Localizer`."""
         lifted = (lift(frame, detection, self.config.lift) for detection in self.detect(frame.rgb, labels))
         return [found for found in lifted if found is not None]
 

@@ -47,11 +47,7 @@ class Refusal(StrEnum):
 
 
 class PlanRefused(GolemError):
-    """There is no plan; nothing has moved.
-
-    Attributes:
-        refusal: why, in a word.
-    """
+    """There is no plan; nothing has moved. Why, in a word, is its `refusal`."""
 
     def __init__(self, refusal: Refusal, reason: str) -> None:
         """Say why there is none, in a word and in a sentence."""

@@ -93,13 +93,9 @@ class JointSpace:
         held: Sequence[Held] = (),
         margins: tuple[float, float] = (0.0, 0.01),
     ) -> None:
-        """Lay out the tables.
+        """Lay out the tables for joints that are at `q` (15,) at the start [rad]: `Balanced` counts from there.
 
-        Args:
-            q: (15,) where the joints are at the start [rad]; `Balanced` counts from there.
-            rules: what a posture has to keep besides.
-            margins: distances between conservative spheres that are kept, of the robot from itself and from the
-                world [m].
+        The conservative spheres keep the distances `margins`, of the robot from itself and from the world [m].
         """
         self.robot, self.rules = robot, tuple(rules)
         model = robot.model(held)

@@ -19,7 +19,6 @@ class Straight(PathPlanner):
     def find(
         self, space: JointSpace, q: Array, goals: Array, rng: np.random.Generator, effort: Effort, attempt: int
     ) -> Array:
-        """Return start and goal; see `PathPlanner`."""
         line = straight_line(space, q, goals, effort, FINE)
         if line is None:
             raise PlanRefused(Refusal.NO_PATH, "Something is in the way of a straight line to every goal.")

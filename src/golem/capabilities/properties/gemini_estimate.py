@@ -44,8 +44,7 @@ class GeminiEstimate:
     def properties(self, label: str) -> Properties:
         """Return the model's estimate; see `PropertySource`.
 
-        Raises:
-            ServiceUnavailable: no answer in time, a refusal, nonsense, or the budget of questions is used up.
+        Raises ServiceUnavailable: no answer in time, a refusal, nonsense, or the budget of questions is used up.
         """
         if label not in self._known:
             self._known[label] = read_properties(self._service.ask(({"text": _question(label)},)), label)
@@ -64,8 +63,7 @@ def _question(label: str) -> str:
 def read_properties(text: str, label: str) -> Properties:
     """Return the properties that the model's words hold: JSON, bare or fenced.
 
-    Raises:
-        ServiceUnavailable: they hold none, or numbers that no thing for a hand has.
+    Raises ServiceUnavailable: they hold none, or numbers that no thing for a hand has.
     """
     said = read_json(text)
     fields = cast("Mapping[str, Any]", said) if isinstance(said, Mapping) else {}

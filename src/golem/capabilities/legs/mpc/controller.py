@@ -58,15 +58,9 @@ class Planner:
     """The plan, its noise and the random numbers."""
 
     def __init__(self, config: PlannerConfig, horizon: float, lower: Array, upper: Array) -> None:
-        """Begin without a plan.
+        """Begin without a plan; the last knot will be at `horizon` [s], targets from `lower` to `upper` (12,) [rad].
 
-        Args:
-            horizon: time from the first to the last knot [s].
-            lower: (12,) lowest targets [rad].
-            upper: (12,) highest targets [rad].
-
-        Raises:
-            ConfigError: fewer than two samples or knots, an elite outside 0 to 1, or not six values of noise.
+        Raises ConfigError: fewer than two samples or knots, an elite outside 0 to 1, or not six values of noise.
         """
         if config.samples < 2 or config.knots < 2:
             raise ConfigError(
@@ -223,14 +217,11 @@ class MPCConfig:
 
 
 class MPC:
-    """Stands by sampling model predictive control; it cannot walk, and its envelope says so: it has heights only.
+    """Stands by sampling model predictive control, by the plan of `planner`; its envelope has heights only.
 
     The command of every tick is the plan's value `latency` later, which is when the command arrives. What a new plan
     cannot change any more, because the legs will have done it by the time the plan is there, is the same in all of its
     rollouts.
-
-    Attributes:
-        planner: the present plan.
     """
 
     def __init__(self, config: MPCConfig | None = None) -> None:

@@ -95,14 +95,9 @@ class PlanningModel:
     """
 
     def __init__(self, posture: Array, kp: Array, kd: Array, timestep: float, threads: int) -> None:
-        """Build the model.
+        """Build the model of motors with stiffness `kp` and damping `kd`, (12,) each [N m/rad, N m s/rad].
 
-        Args:
-            posture: (12,) reference leg joints [rad].
-            kp: (12,) stiffness of the motors [N m/rad].
-            kd: (12,) their damping [N m s/rad].
-            timestep: step of the rollouts [s].
-            threads: worker threads; 0 rolls out on the caller's.
+        The reference is `posture` (12,) [rad]; rollouts take steps of `timestep` [s] on `threads`, 0 is the caller's.
         """
         limits = SafetyLimits.from_profile()
         self.timestep = timestep
