@@ -1,4 +1,4 @@
-"""Stands on both feet by whole-body control: one quadratic program per tick, and every number in it can be read.
+"""Stands on both feet by whole-body control: one quadratic program per tick.
 
 From the measured state alone follow four wishes, each a spring and a damper in acceleration: the centre of mass above
 the middle of the soles with the pelvis at the stance's height, an upright pelvis that faces where the feet point, soles
@@ -26,7 +26,7 @@ from golem.capabilities.legs.wbc_qp import NUM_LEGS, QpWeights, Solution, Stance
 from golem.errors import ConfigError, GolemError, unknown_name
 from golem.interfaces.payloads import LegCommand
 from golem.robots.model.imu_mount import sensed_base_rate
-from golem.robots.model.table import JOINT_NAMES, load_limits
+from golem.robots.model.table import load_limits
 from golem.types import LEGS, Array, BaseEstimate, LowState
 
 _SLIP = np.array([0.003, 0.003, 0.02])
@@ -94,27 +94,6 @@ class WbcConfig:
     rate: float = 500.0
 
 
-@dataclass(frozen=True, slots=True)
-class WbcReport:
-    """Why the legs were told what they were told at one tick; vectors are in level axes.
-
-    Attributes:
-        com_error: (3,) from the centre of mass to where it belongs [m]; the height is the pelvis'.
-        forces: (2, 4, 3) on the corners of the left and the right sole [N].
-        corners: (2, 4, 3) where these act, relative to base_link [m].
-        at_limit: joints whose torque is at its bound.
-        share: of these torques that is commanded, less than 1 until the feet are loaded.
-        solved: False where the solver failed and the previous torque was kept.
-    """
-
-    com_error: Array
-    forces: Array
-    corners: Array
-    at_limit: tuple[str, ...]
-    share: float
-    solved: bool
-
-
 class Wbc:
     """The stance controller; it ignores the twist, and its envelope has heights only."""
 
@@ -142,12 +121,11 @@ class Wbc:
         self._share = 0.0
         self._solution: Solution | None = None
         self._failures = 0
-        self._asked: Array | None = None
         self._speed: Array | None = None
 
     def reset(self, state: LowState) -> None:
         """Forget everything; the next tick takes posture, height and load of the feet from its measurements."""
-        self._hold = self._apart = self._solution = self._asked = self._speed = None
+        self._hold = self._apart = self._solution = self._speed = None
         self._failures = 0
 
     def step(self, state: LowState, base: BaseEstimate, motion: LocomotionCommand, dt: float) -> LegCommand:
@@ -178,25 +156,8 @@ class Wbc:
         self._solution = solution or self._solution
         if self._solution is None or self._failures > c.patience:
             raise StanceError(f"Wbc found no contact forces for {self._failures} ticks in a row.")
-        self._asked = goal
         tau = self._share * (self._solution.torque + self._kd * speed[LEGS])
         return LegCommand(hold.copy(), (1.0 - self._share) * self._kp, self._kd.copy(), tau)
-
-    @property
-    def last(self) -> WbcReport | None:
-        """The report of the last tick, worked out when it is asked for; None before the first tick."""
-        if self._asked is None or self._solution is None:
-            return None
-        d, solution = self._dynamics, self._solution
-        full = np.abs(solution.torque) > self._bound - 1e-3
-        return WbcReport(
-            com_error=self._asked - d.com,
-            forces=solution.forces,
-            corners=d.soles[:, None] + np.einsum("fij,cj->fci", d.soles_R, self._program.corners),
-            at_limit=tuple(JOINT_NAMES[i] for i in np.flatnonzero(full)),
-            share=self._share,
-            solved=self._failures == 0,
-        )
 
     def _goal(self, middle: Array) -> tuple[Array, Array]:
         """Return the rotation that base_link shall have, and where the centre of mass belongs."""
