@@ -86,7 +86,6 @@ class Tick(Awaitable[None]):
     """Await this to give the tick back until the skill's next period."""
 
     def __await__(self) -> Generator[None, None, None]:
-        """Suspend once."""
         yield
 
 

@@ -97,7 +97,6 @@ class Disassemble:
     Goal, Result = DisassembleGoal, DisassembleReport
 
     def __init__(self, config: KeptFileConfig | None = None) -> None:
-        """Find lists and keep jobs in the folder of `config`."""
         self._folder = Path((config or KeptFileConfig()).folder)
 
     def timeout(self, goal: DisassembleGoal) -> float:
@@ -131,7 +130,6 @@ class Disassemble:
         return result
 
     async def _some(self, context: Context, goal: DisassembleGoal) -> SkillResult:
-        """Go along the pack."""
         start, report, docks = context.t, DisassembleReport(), goal.docks
         if docks:
             docked = await self._dock(context, goal, report)

@@ -47,14 +47,10 @@ class KeptGrip:
 
 
 async def close_hand(context: Context, side: Side, force: float, patience: float = PATIENCE) -> bool:
-    """Close a hand; return whether it holds something.
+    """Close a hand with `force` of each finger [N]; return whether it holds something, after `patience` [s] at most.
 
     A hand that noticed a slip keeps pressing, and no longer says that it holds: what slid between its fingers and is
     still there is found by closing again.
-
-    Args:
-        force: of each finger [N].
-        patience: time the fingers may take [s].
     """
     hand = context.hands[side]
     hand.close(force)

@@ -32,7 +32,6 @@ class Gantry:
         self.at, self.loosened, self.t = "", set[str](), context.t
 
     def __call__(self) -> None:
-        """Listen."""
         said = SENTENCE.fullmatch((self._news.read() or "")[:100])
         if said is not None and said[1] in self._names:
             self.loosened |= {self.at} - {said[1], ""}

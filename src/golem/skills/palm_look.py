@@ -194,12 +194,8 @@ class PalmLook:
     async def before(self, target: LocalizedObject, scene: Array, grasp: Grasp) -> tuple[Grasp, View]:
         """Return the grasp of a hand that is before it, and what it sees of the thing, on its way to it.
 
-        It looks where it is, and nearer. Raises PlanRefused: the hand cannot go on to it.
-
-        Args:
-            target: as the grasp was proposed on it.
-            scene: (n, 3) points around it, from the same look.
-            grasp: where the hand is about to go.
+        It looks where it is, and nearer; `scene` (n, 3) are points around the thing from the same look [m].
+        Raises PlanRefused: the hand cannot go on to it.
         """
         c, view = self._config, View(target.points, scene)
         axis = grasp.T_odom_gripper[:3, 2]
@@ -258,11 +254,8 @@ class PalmLook:
 def centred(grasp: Grasp, points: Array) -> Grasp:
     """Return a grasp with the middle of what is between its fingers in the middle of the pads, if that is narrow.
 
-    Fingers centre a thing along the closing axis; a neck that is beside the pads across it turns out of them.
-
-    Args:
-        grasp: where the hand is about to go.
-        points: (n, 3) of the thing as the palm camera shows it.
+    Fingers centre a thing along the closing axis; a neck that is beside the pads across it turns out of them. The palm
+    camera shows the thing as `points` (n, 3) [m].
     """
     T = grasp.T_odom_gripper
     local = (points - T[:3, 3]) @ T[:3, :3]

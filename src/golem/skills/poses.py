@@ -12,11 +12,9 @@ from golem.types import Array
 
 
 def floor_places(what: str, numbers: Sequence[float]) -> Array:
-    """Return (n, 2) the places that `numbers` name. Raises ConfigError: they are no pairs, or not finite.
+    """Return (n, 2) the places that `numbers` name, x and y of each [m], in the goal that an error calls `what`.
 
-    Args:
-        what: which goal has them, for the error.
-        numbers: x, y of each [m].
+    Raises ConfigError: they are no pairs, or not finite.
     """
     if len(numbers) % 2 or not all(map(math.isfinite, numbers)):
         raise ConfigError(f"The places of {what} are pairs of finite numbers, x and y of each place.")

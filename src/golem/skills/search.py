@@ -76,7 +76,6 @@ class Search:
                 context.say(walked.stage, f"{walked.reason} The next place.")
 
     async def _look(self, context: Context, goal: SearchGoal) -> SkillResult | None:
-        """Look from here; return where it is, if it is seen."""
         await context.run("remember", RememberGoal((goal.text,), LOOK))
         seen = await ask(context, goal.text, "now", None, 3)
         seen.places = [place for place in seen.places if place.last_seen < AGO and place.evidence == "seen"]

@@ -47,7 +47,6 @@ class PolicySkill:
     Goal = PolicyGoal
 
     def __init__(self, config: PolicyLinkConfig | None = None) -> None:
-        """Take the server's address; it is asked when the skill runs."""
         self._config, self._gaps = config or PolicyLinkConfig(), [np.inf, np.inf]
 
     def timeout(self, goal: PolicyGoal) -> float:

@@ -50,14 +50,10 @@ def surface_below(points: Array, place: Array, radius: float = ABOUT) -> float |
 async def find(
     context: Context, label: str, near: tuple[float, float] | None, timeout: float
 ) -> LocalizedObject | None:
-    """Return the thing of a class that the head camera shows, nearest to where it is expected; None without one.
+    """Return the thing of a class that the head camera shows within `timeout` [s]; None without one.
 
-    Args:
-        near: x, y in odom where it is expected [m]; None: the one that is told most surely.
-        timeout: how long to look [s].
-
-    Raises:
-        StageFailed: the camera gave no detections.
+    It is the one nearest to where it is expected, `near`, x and y in odom [m]; None: the one that is told most surely.
+    Raises StageFailed: the camera gave no detections.
     """
     with context.watch("head", label) as eye:
         end, seen = context.t + timeout, False

@@ -52,11 +52,7 @@ def fit_hand(views: Sequence[TagView], camera: Side, info: CameraInfo, zero: flo
 def hand_information(camera: Side, q: Array, tags: Sequence[int], zero: float) -> Array:
     """Return what a view would tell of mount, zeros and cuff, (26, 26), in units of their priors; see `fit_hand`.
 
-    Args:
-        camera: the side whose hand carries the camera.
-        q: (27,) joints [rad].
-        tags: which of the other hand's tags are seen.
-        zero: see `fit_hand`.
+    The joints are at `q` (27,) [rad], and those `tags` of the other hand are seen.
     """
     view = TagView(OTHER[camera], q, dict.fromkeys(tags, np.zeros((4, 2))))
     return _HandProblem([view], camera, CAMERAS[f"{camera}_hand"], zero).information()

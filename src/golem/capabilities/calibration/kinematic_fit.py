@@ -86,9 +86,7 @@ def fit(views: Sequence[TagView], info: CameraInfo) -> Calibration:
 def information(side: Side, q: Array, tags: Sequence[int]) -> Array:
     """Return what a view would tell of mount, the arm's zeros and the cuff, (19, 19), in units of their priors.
 
-    Args:
-        q: (27,) joints [rad].
-        tags: which of its tags are.
+    The joints are at `q` (27,) [rad], and those `tags` are seen.
     """
     problem = _Problem([TagView(side, q, dict.fromkeys(tags, np.zeros((4, 2))))], HEAD)
     k = SIDES.index(side)

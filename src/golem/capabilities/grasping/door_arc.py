@@ -44,14 +44,10 @@ class Door:
 
 
 def door_behind(handle: Array, scene: Array) -> Door | None:
-    """Return the door behind a handle; None where the camera shows no upright plane there.
+    """Return the door behind a handle, (3,) a point of it, by the `scene` (n, 3) of a camera, both in odom [m].
 
     The hinge is where the door ends, on the side on which it ends later; a door that leaves the picture is at least as
-    wide as is seen.
-
-    Args:
-        handle: (3,) a point of it, in odom [m].
-        scene: (n, 3) what the camera shows, in odom [m].
+    wide as is seen. None: the camera shows no upright plane there.
     """
     off = np.abs(scene - handle)
     near = scene[(off[:, :2] < AROUND[0]).all(axis=1) & (off[:, 2] < AROUND[1])]

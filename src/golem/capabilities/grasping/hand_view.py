@@ -26,10 +26,7 @@ TOUCHING = 2
 def collides(T: Array, gaps: Array, points: Array) -> NDArray[np.bool_]:
     """Return (n,) whether the open hand at each pose holds points in its own volume.
 
-    Args:
-        T: (n, 4, 4) poses of the grasp frame.
-        gaps: (n,) openings [m].
-        points: (m, 3) in the same frame as the poses [m].
+    It is at `T` (n, 4, 4) with openings `gaps` (n,) [m]; `points` (m, 3) are in the same frame [m].
     """
     local = in_hands(T, points)
     x, y, z = np.abs(local[..., 0]), np.abs(local[..., 1]), local[..., 2]

@@ -214,7 +214,6 @@ class Handover:
         return math.hypot(ahead - motion.twist.vx, sideways - motion.twist.vy) > bound
 
     def _is_in_place(self, base: BaseEstimate) -> bool:
-        """Return whether the base hardly moves over the floor."""
         return math.hypot(base.velocity[0], base.velocity[1]) < self.config.speed
 
     def _is_healthy(self, state: LowState, base: BaseEstimate) -> bool:

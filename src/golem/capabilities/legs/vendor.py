@@ -148,7 +148,6 @@ class Vendor:
         return legs if legs is not None and bool((legs.kd > 0.0).all()) else damp(state)
 
     def _run(self) -> Wait:
-        """Speak to the on-board controller, from the first question to the last velocity."""
         api = self._api
         yield from self._wait(SETTLE)
         state = yield from self._ask_state()

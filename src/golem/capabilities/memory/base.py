@@ -128,12 +128,7 @@ def apart(places: Iterable[Place], spread: float, limit: int) -> list[Place]:
 
 
 def check_observation(observation: Observation, last: float) -> None:
-    """Refuse a look that no memory can take. Raises MemoryFault: see `Memory.observe`.
-
-    Args:
-        observation: the look.
-        last: time of the one before [s].
-    """
+    """Refuse a look that no memory can take after one of time `last` [s]. Raises MemoryFault: see `Memory.observe`."""
     frame = observation.frame
     if not np.isfinite(frame.t):
         raise MemoryFault("The time of an observation is not finite.")

@@ -223,7 +223,6 @@ class CostmapAstar:
         return NavStep(twist, False, left, None, self._path, "follow")
 
     def _is_stuck(self, dt: float) -> bool:
-        """Return whether the robot has hardly moved for too long."""
         gone = self._mark.to(self._pose)
         if math.hypot(gone.x, gone.y) > PROGRESS:
             self._mark, self._marked = self._pose, 0.0
@@ -260,7 +259,6 @@ class CostmapAstar:
         return float(abs(self._footprint.corners[:, 1]).max()) + self.config.local.margin
 
     def _plan(self) -> None:
-        """Search for a way, around what the newest scan saw as well."""
         self._planned = 0.0
         costmap = self._surroundings.with_new(self._half_width)
         if costmap is None:

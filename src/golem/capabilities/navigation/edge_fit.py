@@ -48,9 +48,8 @@ class NearEdge:
 def table_height(local: Array, heights: Array) -> float | None:
     """Return the height above the floor of the largest level surface ahead [m]; None where there is none.
 
-    Args:
-        local: (n, 2) points as seen from the robot, which looks along x [m].
-        heights: (n,) above the floor [m].
+    The points are `local` (n, 2), as seen from the robot, which looks along x [m], at `heights` (n,) above the floor
+    [m].
     """
     low, high = LEVELS
     ahead = (local[:, 0] > 0.1) & (local[:, 0] < 2.5) & (np.abs(local[:, 1]) < 1.0)

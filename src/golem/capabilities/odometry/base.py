@@ -110,17 +110,7 @@ def lidar_in_base(waist: float) -> Array:
 
 
 def of_the_world(points: Array, T_base_lidar: Array, blind: float = BLIND, body: tuple[float, ...] = BODY) -> Array:
-    """Return which points are finite and not the robot's own.
-
-    Args:
-        points: (n, 3) in lidar_link [m].
-        T_base_lidar: (4, 4) pose of lidar_link in base_link.
-        blind: see `BLIND`.
-        body: see `BODY`.
-
-    Returns:
-        (n,) truth values.
-    """
+    """Return (n,) which points (n, 3) in lidar_link [m] are finite and not the robot's own; see `BLIND` and `BODY`."""
     in_base = points @ T_base_lidar[:3, :3].T + T_base_lidar[:3, 3]
     corners = np.array(body)
     own = ((in_base > corners[:3]) & (in_base < corners[3:])).all(axis=1)

@@ -157,7 +157,6 @@ def read_json(text: str) -> Any:
 
 
 def _words(raw: bytes) -> str:
-    """Return the text of an answer of the service."""
     try:
         parts = json.loads(raw)["candidates"][0]["content"]["parts"]
         return "".join(part.get("text", "") for part in parts)

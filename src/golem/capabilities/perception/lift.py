@@ -83,14 +83,8 @@ def surface_depth(depths: NDArray[np.float32], config: LiftConfig, *, flush: boo
 def lift(frame: RgbdImage, detection: Detection, config: LiftConfig) -> LocalizedObject | None:
     """Return the detection in space, or None when its depth is not valid, or that of a hole.
 
-    Args:
-        frame: depth, camera and pose.
-        detection: in the frame's image.
-        config: how depth is read.
-
-    Returns:
-        position: the surface point seen at the detection's centre; for a hole the centre of its mouth. points and mask:
-        all valid depths in the grown box: the object and the ground around it.
+    Its position is the surface point seen at the detection's centre; for a hole the centre of its mouth. Its points and
+    its mask are all valid depths in the grown box: the object and the ground around it.
     """
     low, high = detection.box[:2], detection.box[2:]
     cloud = _window(frame, low - config.grow * (high - low) - 0.5, high + config.grow * (high - low) + 0.5)

@@ -68,11 +68,9 @@ class OnnxDetector:
             ) from error
 
     def detect(self, image: NDArray[np.uint8], labels: Sequence[str] | None = None) -> list[Detection]:
-        """Return the detections in an image, best first. Raises ConfigError: unknown label.
+        """Return the detections in a (height, width, 3) RGB image, best first; of all classes without `labels`.
 
-        Args:
-            image: (height, width, 3) RGB.
-            labels: classes to return; all if absent.
+        Raises ConfigError: unknown label.
         """
         wanted = set(self.classes if labels is None else labels)
         for label in sorted(wanted - set(self.classes)):

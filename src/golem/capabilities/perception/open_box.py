@@ -83,11 +83,9 @@ class OpenBox:
         return np.where(count >= LEAST, total / np.maximum(count, 1), np.nan).reshape(shape)
 
     def places(self, margin: float, spacing: float = 0.02) -> Array:
-        """Return (n, 3) places at the height of `level`, `margin` [m] inside the rim, the middle first.
+        """Return (n, 3) places at the height of `level`, `margin` [m] inside the rim and `spacing` [m] apart.
 
-        Args:
-            margin: distance from the rim; a box that is too narrow has its middle line, or its middle alone.
-            spacing: between them [m].
+        The middle comes first. A box that is too narrow has its middle line, or its middle alone.
         """
         halves = np.maximum(0.5 * self.size - margin, 0.0)
         steps = [np.arange(-np.floor(h / spacing), np.floor(h / spacing) + 1) * spacing for h in halves]

@@ -151,11 +151,9 @@ class YoloWorld:
 
 
 def letterbox(image: NDArray[np.uint8], size: tuple[int, int]) -> tuple[NDArray[np.float32], float, Array]:
-    """Return an image in a grey one, (1, 3, height, width) from 0 to 1, the scale, and the shift (2,) of x, y [px].
+    """Return an RGB image (h, w, 3) in a grey one, (1, 3, height, width) from 0 to 1, the scale, and the shift (2,).
 
-    Args:
-        image: (h, w, 3) RGB.
-        size: height and width that the network takes [px].
+    The grey one has the `size`, height and width, that the network takes; the shift is along x and y [px].
     """
     height, width = image.shape[:2]
     scale = min(size[0] / height, size[1] / width)

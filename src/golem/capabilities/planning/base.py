@@ -55,7 +55,6 @@ class PlanRefused(GolemError):
         self.refusal = refusal
 
     def __str__(self) -> str:
-        """Return the sentence."""
         return str(self.args[1])
 
 

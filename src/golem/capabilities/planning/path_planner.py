@@ -88,9 +88,7 @@ def round_corners(corners: Array, cut: float, free: Callable[[Array], bool]) -> 
 def time_path(points: Array, limits: MotionLimits, hands: Array) -> tuple[Array, Array]:
     """Return times (m,) [s] and velocities (m, n) [rad/s] of the points (m, n) of a path, m >= 3.
 
-    Args:
-        points: no two neighbours alike.
-        hands: (m, k, 3) where the hands are at each point [m].
+    No two neighbours are alike; the hands are at `hands` (m, k, 3) there [m].
     """
     steps = np.diff(points, axis=0)
     lengths = np.linalg.norm(steps, axis=1)

@@ -26,12 +26,9 @@ class Straight(PathPlanner):
 
 
 def straight_line(space: JointSpace, q: Array, goals: Array, effort: Effort, step: float) -> Array | None:
-    """Return the corners (2, 15) of the straight line to the nearest goal that has a free one, or None.
+    """Return the corners (2, 15) of the straight line from `q` (15,) to the nearest of `goals` (k, 15) with a free one.
 
-    Args:
-        q: (15,) start.
-        goals: (k, 15).
-        step: between two checks [rad in a joint].
+    None: none has. Between two checks are `step` [rad in a joint].
     """
     for i in np.argsort(np.abs(goals - q).max(axis=1), kind="stable"):
         if effort.left <= 0:
@@ -137,7 +134,6 @@ def _branch(nodes: Array, parents: Array, leaf: int) -> Array:
 
 
 def _without_repeats(path: Array) -> Array:
-    """Return the path without points that are where the one before is."""
     apart = np.abs(np.diff(path, axis=0)).max(axis=1) > STILL
     apart[-1] = True  # the goal itself stays, not a point by it
     kept = path[np.r_[True, apart]]

@@ -31,7 +31,6 @@ class HandBox:
         return _row(plan_kernel.IN_BOX, body, *T_body_gripper[:3, 3], *self.lower, *self.upper)
 
     def __str__(self) -> str:
-        """Return what it asks for."""
         return f"the {self.side} hand stays within its box"
 
 
@@ -58,7 +57,6 @@ class HandUpright:
         return _row(plan_kernel.ALONG_AXIS, body, *T_body_gripper[:3, 2], *axis, float(np.cos(self.angle)))
 
     def __str__(self) -> str:
-        """Return what it asks for."""
         return f"the {self.side} hand stays within {np.rad2deg(self.angle):.0f} deg of its axis"
 
 
@@ -77,7 +75,6 @@ class Balanced:
         return _row(plan_kernel.BALANCED, 0, *com[:2], self.shift)
 
     def __str__(self) -> str:
-        """Return what it asks for."""
         return f"the centre of mass moves by {self.shift * 1e3:.0f} mm at most"
 
 

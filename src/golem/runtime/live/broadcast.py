@@ -77,8 +77,6 @@ class Broadcast:
 
 
 def _nodes(bus: Bus, robot: Robot, domain: LocalDomain) -> list[Node]:
-    """Return what makes the robot, its gate and its stack public."""
-
     def endpoints(role: Role) -> RoleEndpoints:
         participant = domain.participant()
         return RoleEndpoints(role, participant, RosNode(participant, role))

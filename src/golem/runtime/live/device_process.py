@@ -128,7 +128,6 @@ class DeviceProcess(ABC):
     """A device without its loop: what it measures is sent with the robot's time, what is wrong is told once."""
 
     def __init__(self, place: DriverPlace, topics: Collection[str]) -> None:
-        """Publish `topics` of the robot."""
         self.clock, self.tell = place.clock, place.tell
         self.endpoints = RoleEndpoints("robot", place.participant, place.node, topics)
         self._robot_time = RobotTime(place.node, place.clock)
@@ -180,7 +179,6 @@ class LidarProcess(DeviceProcess):
     """The LiDAR. Silence is told, and what was lost, and nothing else."""
 
     def __init__(self, place: DriverPlace, lidar: Mid360) -> None:
-        """Publish what `lidar` measures."""
         super().__init__(place, (CLOUD, IMU))
         self._lidar = lidar
         self._heard, self._silent = place.clock(), False

@@ -73,7 +73,6 @@ class Nav2Bridge(Node):
         self._answer.then(lambda answer: self._answered(goal.number, answer))
 
     def _answered(self, number: int, answer: Future[ClientGoal]) -> None:
-        """Take Nav2's decision about a goal."""
         try:
             given = answer.result()
         except Exception:  # whatever became of the call: the goal is not pursued

@@ -73,7 +73,6 @@ class Growth:
     """Says once how fast a bag grows, and how long the disk has room for it."""
 
     def __init__(self, bag: BagWriter, say: Callable[[str], None] = log_line) -> None:
-        """Watch `bag`; `say` a line to a person."""
         self._bag, self._say = bag, say
         self._since: tuple[float, int] | None = None
         self._said = False

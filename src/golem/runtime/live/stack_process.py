@@ -101,7 +101,6 @@ class LegsMonitor(Node):
     period = 0.1
 
     def __init__(self, bus: Bus, tell: Callable[[str], None]) -> None:
-        """Watch `bus`; `tell` says a line to a person."""
         self._bus, self._tell = bus, tell
         self._fault: str | None = None
         self._blind_since: float | None = None

@@ -86,7 +86,6 @@ class UnansweredCalls(Node):
     period = TICK
 
     def __init__(self, bus: Bus, api: LocoApi, tell: Callable[[str], None]) -> None:
-        """Read the calls to the service of `api` on `bus`; `tell` says a line to a person."""
         self._news, self._api, self._tell = News(bus, topics.api_request(api.service)), api, tell
         self._reported = False
 
