@@ -20,7 +20,7 @@ from golem.robots.model.spatial import transform
 from golem.robots.sensors.calibration import read_calibration
 from golem.skills.base import SkillResult, StageFailed
 from golem.skills.context import Context
-from golem.skills.kept_file import KeptFileConfig, check_file_name, kept_file
+from golem.skills.kept_file import KeepsFiles, check_file_name, kept_file
 from golem.skills.planned_motion import PlannedMotion
 from golem.types import SIDES, Array, CameraInfo, Side
 
@@ -146,7 +146,7 @@ class CalibrateReport:
     joint_sigma: float = 0.0
 
 
-class Calibrate:
+class Calibrate(KeepsFiles):
     """Show the head camera both hands in many postures, and find its mount and the arms' encoder zeros.
 
     The hands wear their cuffs of tags. Stages (see `Skill`): `look`, `fit`, `done`.
@@ -154,9 +154,6 @@ class Calibrate:
 
     Goal = CalibrateGoal
     Result = CalibrateReport
-
-    def __init__(self, config: KeptFileConfig | None = None) -> None:
-        self.config = config or KeptFileConfig()
 
     def timeout(self, goal: CalibrateGoal) -> float:
         return 60.0 + 2 * goal.views * (8.0 + goal.settle)

@@ -11,7 +11,7 @@ from golem.robots.sensors.calibration import Calibration, read_calibration
 from golem.skills.base import SkillResult, StageFailed
 from golem.skills.calibrate import TagLooks
 from golem.skills.context import Context
-from golem.skills.kept_file import KeptFileConfig, check_file_name, kept_file
+from golem.skills.kept_file import KeepsFiles, check_file_name, kept_file
 from golem.types import SIDES
 
 AHEAD = 0.1
@@ -64,7 +64,7 @@ class CalibrateHandsReport:
     camera_sigma: tuple[float, ...] = ()
 
 
-class CalibrateHands:
+class CalibrateHands(KeepsFiles):
     """Show each palm camera the other hand in many postures, and find where it sits.
 
     The hands wear their cuffs of tags. Stages (see `Skill`): `look`, `fit`, `done`.
@@ -72,9 +72,6 @@ class CalibrateHands:
 
     Goal = CalibrateHandsGoal
     Result = CalibrateHandsReport
-
-    def __init__(self, config: KeptFileConfig | None = None) -> None:
-        self.config = config or KeptFileConfig()
 
     def timeout(self, goal: CalibrateHandsGoal) -> float:
         return 60.0 + 2 * goal.views * (10.0 + goal.settle)

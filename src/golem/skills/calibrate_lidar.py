@@ -16,7 +16,7 @@ from golem.robots.sensors.calibration import read_calibration
 from golem.skills.base import SkillResult, StageFailed
 from golem.skills.calibrate import FRAME_TIME, SPEED, WORK_PLACE
 from golem.skills.context import Context
-from golem.skills.kept_file import KeptFileConfig, check_file_name, kept_file
+from golem.skills.kept_file import KeepsFiles, check_file_name, kept_file
 from golem.skills.planned_motion import PlannedMotion
 from golem.types import SIDES, CameraInfo
 
@@ -77,7 +77,7 @@ class CalibrateLidarReport:
     moved_sigma: float = 0.0
 
 
-class CalibrateLidar:
+class CalibrateLidar(KeepsFiles):
     """Look at floor, walls and furniture with head camera and LiDAR, turn the torso, and find where the LiDAR sits.
 
     The head camera is calibrated first. Stages (see `Skill`): `look`, `fit`, `done`.
@@ -85,9 +85,6 @@ class CalibrateLidar:
 
     Goal = CalibrateLidarGoal
     Result = CalibrateLidarReport
-
-    def __init__(self, config: KeptFileConfig | None = None) -> None:
-        self.config = config or KeptFileConfig()
 
     def timeout(self, goal: CalibrateLidarGoal) -> float:
         return 60.0 + goal.views * (15.0 + goal.settle)

@@ -14,7 +14,7 @@ from golem.middleware.bus import News
 from golem.options import require
 from golem.skills.base import SkillResult, StageFailed
 from golem.skills.context import Context
-from golem.skills.kept_file import KeptFileConfig, check_file_name, kept_file
+from golem.skills.kept_file import KeepsFiles, check_file_name, kept_file
 from golem.skills.navigate import FIRST_MAP
 from golem.skills.pose_goal import FIRST_REPORT, MARGIN, MAX_TIMEOUT, go_to, standing_after_failure
 from golem.types import PlanarPose
@@ -52,16 +52,13 @@ class ExploreGoal:
         check_file_name(self.save)
 
 
-class Explore:
+class Explore(KeepsFiles):
     """Map the hall by walking to where the map ends, come home, and keep the map if asked to.
 
     Stages (see `Skill`): `locate`, `explore`, `home`, `save`, `done`. A frontier that cannot be reached is left out.
     """
 
     Goal = ExploreGoal
-
-    def __init__(self, config: KeptFileConfig | None = None) -> None:
-        self.config = config or KeptFileConfig()
 
     def timeout(self, goal: ExploreGoal) -> float:
         return goal.timeout + 2.0 * LEG + FIRST_MAP + SAVING + MARGIN

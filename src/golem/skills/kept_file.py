@@ -23,6 +23,13 @@ class KeptFileConfig:
     folder: str = "."
 
 
+class KeepsFiles:
+    """A skill that keeps files in the folder of its options."""
+
+    def __init__(self, config: KeptFileConfig | None = None) -> None:
+        self.config = config or KeptFileConfig()
+
+
 def check_file_name(name: str, ending: str = "") -> None:
     """Check the name of a file with an `ending`, such as `".json"`, that a goal asks for; the empty one asks for none.
 
