@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from golem.capabilities.perception.open_words import OpenWords, OpenWordsConfig, load_model
+from golem.capabilities.perception.open_words import OpenWords
 
 
 class GroundingDino(OpenWords):
@@ -17,12 +17,7 @@ class GroundingDino(OpenWords):
     Each word is asked for by itself: asked together, the answers are phrases that mix them.
     """
 
-    def __init__(self, config: OpenWordsConfig) -> None:
-        """Load network and processor. Raises MissingExtra, ConfigError: see `load_model`."""
-        super().__init__(config)
-        self._network, self._processor = load_model(
-            config.weights, "grounding-dino", "GroundingDinoForObjectDetection", "GroundingDinoProcessor"
-        )
+    model = "grounding-dino", "GroundingDinoForObjectDetection", "GroundingDinoProcessor"
 
     def answer(self, image: NDArray[np.uint8], words: Sequence[str]) -> list[tuple[int, float, Any]]:
         import torch

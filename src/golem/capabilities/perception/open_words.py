@@ -134,12 +134,19 @@ class OpenWordsConfig:
 
 
 class OpenWords(ABC):
-    """A detector that takes any words; see `Localizer`."""
+    """A detector that takes any words; see `Localizer`.
+
+    Attributes:
+        model: what `load_model` calls it: its kind, and the classes of network and processor.
+    """
+
+    model: tuple[str, str, str]
 
     def __init__(self, config: OpenWordsConfig) -> None:
-        """Load the masks' network, where there is one. Raises MissingExtra, ConfigError: see `load_model`."""
+        """Load the networks and their processors. Raises MissingExtra, ConfigError: see `load_model`."""
         self.config, self.latency = config, config.latency
         self._sam = None if config.sam is None else Sam(config.sam)
+        self._network, self._processor = load_model(config.weights, *self.model)
 
     @abstractmethod
     def answer(self, image: NDArray[np.uint8], words: Sequence[str]) -> list[tuple[int, float, Any]]:

@@ -8,18 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from golem.capabilities.perception.open_words import OpenWords, OpenWordsConfig, load_model
+from golem.capabilities.perception.open_words import OpenWords
 
 
 class Owlv2(OpenWords):
     """Boxes for any words; see `Localizer`."""
 
-    def __init__(self, config: OpenWordsConfig) -> None:
-        """Load network and processor. Raises MissingExtra, ConfigError: see `load_model`."""
-        super().__init__(config)
-        self._network, self._processor = load_model(
-            config.weights, "owlv2", "Owlv2ForObjectDetection", "Owlv2Processor"
-        )
+    model = "owlv2", "Owlv2ForObjectDetection", "Owlv2Processor"
 
     def answer(self, image: NDArray[np.uint8], words: Sequence[str]) -> list[tuple[int, float, Any]]:
         import torch
