@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 from abc import ABC, abstractmethod
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,13 +13,12 @@ from golem.capabilities.arms.arm_kinematics import UpperKinematics
 from golem.capabilities.arms.base import NUM_UPPER, check_dt, check_joints, check_pose
 from golem.capabilities.arms.ik_kernel import rigid
 from golem.capabilities.arms.postures import posture
+from golem.capabilities.collision.collision_model import CollisionModel
+from golem.capabilities.collision.sphere_robot import shipped_spheres
 from golem.errors import ConfigError
 from golem.interfaces.payloads import ArmCommand
 from golem.robots.model.table import JOINT_NAMES
 from golem.types import SIDES, UPPER, Array
-
-if TYPE_CHECKING:
-    from golem.capabilities.collision.collision_model import CollisionModel
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,8 +221,4 @@ _NO_STEP = np.zeros(0)
 
 @functools.cache
 def _spheres() -> CollisionModel:
-    # Numba takes a second to import, and arms without collision rows do without it.
-    from golem.capabilities.collision.collision_model import CollisionModel
-    from golem.capabilities.collision.sphere_robot import shipped_spheres
-
     return CollisionModel(shipped_spheres(), JOINT_NAMES[UPPER])
