@@ -6,7 +6,7 @@ from pathlib import Path
 
 from tests.sources import SOURCE
 
-ALL = 103_052
+ALL = 101_994
 """Lines of the package [own: 100,000 is the goal; lower this with every line that goes]."""
 ON_A_ROBOT = 63_127
 """Lines of what a robot runs [own: 62,000 is the goal]."""
