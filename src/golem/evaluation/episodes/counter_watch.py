@@ -86,7 +86,6 @@ class CounterWatch(ErrandWatch):
             self.picture = self._oracle.picture()
 
     def look(self) -> bool:
-        """Look on after the errand; it is never a reason to end."""
         np.maximum(self._highest, self._robot.data.xpos[self._bodies, 2], out=self._highest)
         return super().look()
 

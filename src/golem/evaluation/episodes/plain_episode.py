@@ -158,12 +158,10 @@ class PlainEpisode:
 
     @property
     def t(self) -> float:
-        """Robot time [s]."""
         return self._robot.t
 
     @property
     def over(self) -> bool:
-        """Whether the robot fell or lost its leg controller."""
         return self.loss is not None
 
     @property
@@ -176,7 +174,6 @@ class PlainEpisode:
         return self._robot.state()
 
     def run(self, seconds: float, until: Callable[[], bool] = lambda: False) -> None:
-        """Let up to `seconds` of robot time pass; a fall or `until()` ends it early."""
         end = self.t + seconds - TICK / 2
         while not self.over and self.t < end:
             self._tick()
@@ -190,7 +187,6 @@ class PlainEpisode:
         self.run(LOWER)
 
     def push(self, push: Push) -> None:
-        """Begin `push` now; it goes on while the episode runs."""
         self._pusher.begin(push, self.t, self.recorder.yaw)
 
     def _tick(self) -> None:

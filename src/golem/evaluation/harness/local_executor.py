@@ -100,11 +100,9 @@ class LocalExecutor:
         self._workers: list[_Worker] = []
 
     def submit(self, batch: Batch) -> None:
-        """Add a batch."""
         self._waiting.append(batch)
 
     def results(self) -> Generator[tuple[Batch, Ending], None, None]:
-        """Yield each batch and how it ended."""
         while True:
             self._give()
             busy = [worker for worker in self._workers if worker.batch is not None]
@@ -132,7 +130,6 @@ class LocalExecutor:
             idle.give(self._waiting.popleft())
 
     def close(self) -> None:
-        """End the processes."""
         self._waiting.clear()
         while self._workers:
             self._workers.pop().kill()

@@ -64,7 +64,6 @@ class TrialRecord:
 
     @property
     def key(self) -> tuple[str, str, int]:
-        """What tells a trial from the others of its run: method, case and index."""
         return self.method, case_name(self.case), self.index
 
     @property

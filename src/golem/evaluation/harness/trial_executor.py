@@ -42,13 +42,11 @@ class DaskExecutor:
             print(f"Waiting for a worker; start one with: dask worker {address}", file=sys.stderr, flush=True)
 
     def submit(self, batch: Batch) -> None:
-        """Add a batch."""
         future = self._client.submit(run_remotely, batch, pure=False)
         self._batches[future] = batch
         self._done.add(future)
 
     def results(self) -> Generator[tuple[Batch, Ending], None, None]:
-        """Yield each batch and how it ended. Raises GolemError: the cluster is gone, or no worker can run golem."""
         while self._batches:
             future = next(self._done)
             batch = self._batches.pop(future)

@@ -230,11 +230,9 @@ class BaseEstimation(Rung[BaseEstimationOptions]):
         return {**stack_facts(walking), "method": stack_facts(walking.with_choice(SLOT, method))["user_files"]}
 
     def together(self, spec: TrialSpec) -> Hashable:
-        """Return what trials share that read the same recording."""
         return spec.index, spec.case["condition"] == PUSHED
 
     def run_together(self, specs: Sequence[TrialSpec]) -> Sequence[TrialOutcome]:
-        """Record one walk, and let estimators follow it."""
         spec = specs[0]
         stack = legs_stack(self.options.legs, spec.profile, spec.overrides)
         episode = Episode(stack, episode_seed(spec.seed, spec.index), self.onlooker)

@@ -200,7 +200,6 @@ class CalibratedTether(PickRung):
         self._file: Path | None = None
 
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
-        """Calibrate, then run one trial; see `Rung`."""
         seed = episode_seed(spec.seed, spec.index)
         found = calibrate(tagged_stack(spec.profile, {}), seed, self._how.views, self._how.keep)
         if isinstance(found, SkillResult):

@@ -77,12 +77,10 @@ class CounterRung(KitchenRung[CounterOptions]):
     subject = "counter"
 
     def make_stack(self, method: str, profile: str, overrides: Mapping[str, str]) -> Stack:
-        """Return the stack of a trial, with things of the sizes that are asked for; see `KitchenRung`."""
         stack = super().make_stack(method, profile, overrides)
         return stack.with_options("robot", sizes=self.options.sizes) if self.options.sizes else stack
 
     def cases(self, results: Results) -> Sequence[Case]:
-        """Return the things and hands that are tried one by one; see `Rung`."""
         kinds = self.options.thing
         for kind in kinds:
             if kind not in KINDS:
@@ -92,7 +90,6 @@ class CounterRung(KitchenRung[CounterOptions]):
         return [{"thing": kind, "hand": hand} for kind in kinds or KINDS for hand in ("left", "right")]
 
     def arranged(self, spec: TrialSpec, stack: Stack) -> Stack:
-        """Return the stack with the counter mirrored where a case needs that; see `KitchenRung`."""
         choice = stack.choice("robot")
         config = registry.configure("robot", choice.use, choice.options)
         kitchen = lay_kitchen(config, episode_seed(spec.seed, spec.index))
@@ -107,7 +104,6 @@ class CounterRung(KitchenRung[CounterOptions]):
     def errand(
         self, spec: TrialSpec, running: LockstepRunner, robot: MujocoRobot, kitchen: KitchenLayout, oracle: Oracle
     ) -> Errand:
-        """Have one thing taken, and set down at another place; see `KitchenRung`."""
         kind, hand, place = draw_errand(spec, kitchen)
         watch = CounterWatch(running, robot, oracle, kind, self.balances)
         result = self._errand(running, robot, watch, TakeGoal(kind, hand, self.options.approach), place)

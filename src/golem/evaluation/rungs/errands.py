@@ -127,14 +127,12 @@ class ErrandsRung(KitchenRung[ErrandsOptions]):
         return True
 
     def cases(self, results: Results) -> Sequence[Case]:
-        """Return the errands; see `Rung`."""
         for name in self.options.errand:
             if name not in SUITE:
                 raise unknown_name("errand", name, SUITE)
         return [{"errand": name} for name in self.options.errand or SUITE]
 
     def arranged(self, spec: TrialSpec, stack: Stack) -> Stack:
-        """Return the stack of one errand; see `KitchenRung`."""
         own = SUITE[str(spec.case["errand"])].get("stack")
         if own is None:
             return stack

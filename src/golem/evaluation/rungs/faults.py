@@ -242,11 +242,9 @@ class FaultsRung(Rung[FaultOptions]):
         return with_modules(load_stack(name, profile=profile).with_options("robot", **world), overrides)
 
     def cases(self, results: Results) -> Sequence[Case]:
-        """Return every fault in every posture."""
         return [{"posture": posture, "fault": name} for posture in self.options.posture for name in self.faults]
 
     def together(self, spec: TrialSpec) -> Hashable:
-        """Return what trials share that have one past."""
         chunk = self.faults.index(str(spec.case["fault"])) // BATCH
         return spec.method, spec.index, spec.case["posture"], chunk
 
@@ -271,7 +269,6 @@ class FaultsRung(Rung[FaultOptions]):
             return [in_a_copy(partial(_try, rig, each)) for each in specs]
 
     def tables(self, outcomes: Outcomes) -> Sequence[TextTable]:
-        """Return how many faults of each source were dealt with, and every one that was not."""
         trials = [pair for each in outcomes.values() for pair in each]
         rows, lost = list[tuple[str, ...]](), list[tuple[str, ...]]()
         for posture in self.options.posture:

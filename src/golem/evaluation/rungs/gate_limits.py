@@ -92,7 +92,6 @@ class GateLimits(PushedRung[GateLimitsOptions]):
             lifted(SafetyLimits.from_profile(), names)
 
     def cases(self, results: Results) -> Sequence[Case]:
-        """Return every push, under every gate."""
         o = self.options
         return [
             {"lift": lift, "phase": phase, "walk": walk, "direction": direction, "level": level}
@@ -103,15 +102,12 @@ class GateLimits(PushedRung[GateLimitsOptions]):
         ]
 
     def together(self, spec: TrialSpec) -> Hashable:
-        """Return what trials share that have one past: all but level and direction."""
         return spec.method, spec.index, spec.case["lift"], spec.case["phase"], spec.case["walk"]
 
     def limits(self, spec: TrialSpec, stack: Stack) -> SafetyLimits:
-        """Return those of the case; see `LegRung`."""
         return lifted(SafetyLimits.from_profile(stack.limits), str(spec.case["lift"]))
 
     def tables(self, outcomes: Outcomes) -> Sequence[TextTable]:
-        """Return how many pushes were survived under each gate, and what ended the others."""
         rows, short = list[tuple[str, ...]](), short_names(outcomes)
         for method, trials in outcomes.items():
             for gait in self.gaits:

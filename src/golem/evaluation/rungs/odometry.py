@@ -158,7 +158,6 @@ class OdometryRung(Rung[OdometryOptions]):
         return {**facts, "cases": {name: _plain(CONDITIONS[name]) for name in self.options.case}}
 
     def together(self, spec: TrialSpec) -> Hashable:
-        """Return what trials share that are of one walk."""
         condition = _condition(spec)
         return spec.index, condition.route, condition.people
 

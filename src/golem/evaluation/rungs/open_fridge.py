@@ -48,7 +48,6 @@ class FridgeRung(KitchenRung[FridgeOptions]):
     def errand(
         self, spec: TrialSpec, running: LockstepRunner, robot: MujocoRobot, kitchen: KitchenLayout, oracle: Oracle
     ) -> Errand:
-        """Have the door opened; see `KitchenRung`."""
         side: Side = "left" if kitchen.fridge.handle_y > 0.0 else "right"
         watch = _FridgeWatch(running, robot, oracle, side, self.balances)
         result = running.execute("open", OpenGoal(), watch=watch)

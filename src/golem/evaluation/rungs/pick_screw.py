@@ -259,7 +259,6 @@ class PickRung(Rung[PickOptions]):
         self._sweep = read_sweep(self.options.sweep)
 
     def cases(self, results: Results) -> Sequence[Case]:
-        """Return the values of the sweep; see `Rung`."""
         return self._sweep
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
@@ -301,11 +300,9 @@ class PickRung(Rung[PickOptions]):
             return replace(outcome, series={**outcome.series, **touches.series(), **right, **ended})
 
     def tables(self, outcomes: Outcomes) -> Sequence[TextTable]:
-        """Return what the robot said at the end, against what was possible; see `Rung`."""
         return verdict_tables({method: [outcome for _, outcome in rows] for method, rows in outcomes.items()})
 
     def plot(self, outcomes: Outcomes, figure: Any) -> str | None:
-        """Draw success by condition where the places vary; see `Rung`."""
         if self.options.layout == "nominal" or self.options.sweep:
             return None
         placed = {

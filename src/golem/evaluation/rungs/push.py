@@ -131,7 +131,6 @@ class PushRampRung(PushRung):
     facts = {**PushRung.facts, "peak": (MAX_FORCE, RATE)}
 
     def draw(self, rng: np.random.Generator) -> tuple[Push, float]:
-        """Return the push of one trial, and the time before it [s]."""
         direction = DIRECTIONS[rng.integers(len(DIRECTIONS))]
         return ramp(direction, MAX_FORCE, MAX_FORCE / RATE), float(rng.uniform(*SETTLE))
 

@@ -70,7 +70,6 @@ class PushLimit(PushedRung[PushLimitOptions]):
         return super().config(method, profile, overrides)
 
     def cases(self, results: Results) -> Sequence[Case]:
-        """Return the levels of every direction as far as the results lead."""
         return [
             case
             for terms in self.options.terms
@@ -106,15 +105,12 @@ class PushLimit(PushedRung[PushLimitOptions]):
         return following if following is not None and 1e-9 < following <= o.last + 1e-9 else None
 
     def together(self, spec: TrialSpec) -> Hashable:
-        """Return what trials share that have one past: all but level and direction."""
         return spec.method, spec.index, spec.case["terms"], spec.case["phase"], spec.case["walk"]
 
     def limits(self, spec: TrialSpec, stack: Stack) -> SafetyLimits:
-        """Return those of the case, on the stack's terms; see `LegRung`."""
         return lifted(SafetyLimits.from_profile(stack.limits), LIFTED[str(spec.case["terms"])])
 
     def pushed(self, specs: Sequence[TrialSpec]) -> Sequence[TrialOutcome]:
-        """Push one robot, on the terms of its case; see `PushedRung`."""
         spec = specs[0]
         if spec.case["terms"] != "own":
             return super().pushed(specs)
@@ -125,7 +121,6 @@ class PushLimit(PushedRung[PushLimitOptions]):
         return self.from_moment(specs, plain, can_walk(plain.envelope), self.moment(spec).reach_plainly)
 
     def tables(self, outcomes: Outcomes) -> Sequence[TextTable]:
-        """Return the largest push survived, a row per method, terms and gait; and what the gate costs of it."""
         o, unit = self.options, "N s" if self.options.kind == "shove" else "N"
         what = "shove of 0.2 s on the torso [N s]" if o.kind == "shove" else "half-sine push of 1 s at the pelvis [N]"
         n = len({spec.index for trials in outcomes.values() for spec, _ in trials})

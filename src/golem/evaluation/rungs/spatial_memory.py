@@ -186,17 +186,14 @@ class MemoryRung(Rung[Any]):
         return stack_facts(Stack(profile=profile).with_choice(SLOT, method))
 
     def together(self, spec: TrialSpec) -> Hashable:
-        """Return what trials share that see the same looks."""
         return spec.index, spec.case["condition"]
 
     def run_together(self, specs: Sequence[TrialSpec]) -> Sequence[TrialOutcome]:
-        """Render the looks once, and let memories see them."""
         condition = CONDITIONS[str(specs[0].case["condition"])]
         episode = relocation(specs[0].rng("memory"), condition)
         return [ask(spec.method, episode) for spec in specs]
 
     def tables(self, outcomes: Outcomes) -> Sequence[TextTable]:
-        """Return what was asked, per condition and memory, beside the paper's; see `Rung`."""
         rows, n = list[tuple[str, ...]](), 0
         for condition in CONDITIONS:
             for method, trials in outcomes.items():

@@ -157,11 +157,9 @@ class Tour(LegRung[TourOptions]):
         return {engine: stack_facts(stack) for engine, stack in stacks.items()}
 
     def trial_stack(self, spec: TrialSpec) -> Stack:
-        """Return the stack of a trial, in the engine of its case."""
         return self.stack(spec.method, spec.profile, {**spec.overrides, "robot": str(spec.case["engine"])})
 
     def limits(self, spec: TrialSpec, stack: Stack) -> SafetyLimits:
-        """Return those that are not lifted; see `LegRung`."""
         return lifted(SafetyLimits.from_profile(stack.limits), self.options.lift)
 
     def trial(self, spec: TrialSpec, episode: Episode) -> TrialOutcome:
@@ -210,7 +208,6 @@ class Tour(LegRung[TourOptions]):
         return replace(outcome, module=None) if thrown else outcome
 
     def tables(self, outcomes: Outcomes) -> Sequence[TextTable]:
-        """Return what another engine than the first changes, tour by tour."""
         short, rows = short_names(outcomes), list[tuple[str, ...]]()
         for method, trials in outcomes.items():
             (first, ours), *others = _by_engine(trials).items()
@@ -219,7 +216,6 @@ class Tour(LegRung[TourOptions]):
         return (TextTable("Gap between engines on the same tours", columns, tuple(rows)),) if rows else ()
 
     def plot(self, outcomes: Outcomes, figure: Any) -> str | None:
-        """Draw who is still on the tour over time: a colour per method, a line per engine."""
         axes, short = figure.subplots(), short_names(outcomes)
         for i, (method, trials) in enumerate(outcomes.items()):
             lines = itertools.cycle(("-", "--", ":", "-."))

@@ -90,7 +90,6 @@ class VarStandRung(PickRung):
     default_methods = ("visual_servo",)
 
     def cases(self, results: Results) -> Sequence[Case]:
-        """Return the starts, without and with docking; see `Rung`."""
         return [
             {**condition, "start": start, "dock": dock}
             for condition in super().cases(results)
@@ -125,7 +124,6 @@ class VarStandRung(PickRung):
                 return outcome
 
     def plot(self, outcomes: Outcomes, figure: Any) -> str | None:
-        """Draw success by condition of the place; how the robot came there is none. See `Rung`."""
         placed = {
             method: [(replace(spec, case=_conditions(spec.case)), outcome) for spec, outcome in rows]
             for method, rows in outcomes.items()

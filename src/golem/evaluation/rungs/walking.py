@@ -74,7 +74,6 @@ class WalkRough(LegRung[WalkRoughOptions]):
         return {g: stack_facts(self.stack(method, profile, overrides, GROUNDS[g])) for g in grounds}
 
     def trial_stack(self, spec: TrialSpec) -> Stack:
-        """Return the stack of a trial, on the ground of its case."""
         return self.stack(spec.method, spec.profile, spec.overrides, GROUNDS[str(spec.case["ground"])])
 
     def trial(self, spec: TrialSpec, episode: Episode) -> TrialOutcome:

@@ -101,7 +101,6 @@ class WholePackRung(VarStandRung):
         return "gantry" if self.options.gantry else "unknown" if self.options.part == "whole" else "list"
 
     def cases(self, results: Results) -> Sequence[Case]:
-        """Return the values of the sweep; see `Rung`."""
         return self._sweep
 
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
@@ -160,7 +159,6 @@ class WholePackRung(VarStandRung):
                 return TrialOutcome(success, stage, module, said, {"total": took}, series, oracle.picture())
 
     def tables(self, outcomes: Outcomes) -> Sequence[TextTable]:
-        """Return what became of the loosened fasteners that are in no tray; see `Rung`."""
         rows: list[tuple[str, ...]] = []
         for method, trials in outcomes.items():
             count = Counter[str]()
