@@ -34,15 +34,15 @@ def plot(*curves: MarginCurve) -> str:
 
 
 def test_a_plot_has_force_and_margin_of_every_trial_and_marks_the_lost() -> None:
-    drawn = plot(MarginCurve(trace(), True), MarginCurve(trace(), False))
+    drawn = plot((trace(), True), (trace(), False))
     assert drawn.startswith("<svg") and "force [N]" in drawn and "CoM margin [mm]" in drawn
     assert drawn.count("stroke: var(--m0)") == 4 and "stroke: var(--lost)" in drawn
-    won = plot(MarginCurve(trace(), True), MarginCurve(trace(), True))
+    won = plot((trace(), True), (trace(), True))
     assert drawn.count("var(--lost)") > won.count("var(--lost)"), "a cross ends a lost one"
 
 
 def test_a_plot_without_a_push_has_no_force() -> None:
-    drawn = plot(MarginCurve(replace(trace(), force=np.zeros((500, 3))), True))
+    drawn = plot((replace(trace(), force=np.zeros((500, 3))), True))
     assert drawn.count("stroke: var(--m0)") == 1 and "force" not in drawn
 
 

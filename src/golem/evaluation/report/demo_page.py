@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from golem.evaluation.report.margin_plot import MarginCurve, margin_plot
+from golem.evaluation.report.margin_plot import margin_plot
 from golem.evaluation.report.svg_figure import render_page, styled
 from golem.robots.mujoco.balance import BalanceTrace
 
@@ -125,12 +125,12 @@ def balance_section(
         f"the support polygon; the pelvis moved within {1e3 * figures['base_range']:.0f} mm; {steps}."
     )
     with styled():
-        parts = [("", words, margin_plot([MarginCurve(work, True)], 0))]
+        parts = [("", words, margin_plot([(work, True)], 0))]
         if pushed_at is not None:
             words = (
                 f"Minimum margin {1e3 * figures['push_margin_min']:.0f} mm: during a step the polygon is one foot. "
                 f"{figures['push_steps']:.0f} steps; {1e3 * figures['push_margin_final']:.0f} mm at the end."
             )
-            after = MarginCurve(trace.window(pushed_at - 1.0), True)
-            parts.append(("A push at the end", words, margin_plot([after], 1)))
+            after = trace.window(pushed_at - 1.0)
+            parts.append(("A push at the end", words, margin_plot([(after, True)], 1)))
     return parts

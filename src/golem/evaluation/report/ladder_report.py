@@ -22,6 +22,7 @@ from golem.evaluation.metrics.text_table import short_names
 from golem.evaluation.report import margin_plot as margins
 from golem.evaluation.report import svg_figure
 from golem.evaluation.report.svg_figure import COLOUR, cause_colour, method_colour, page_figure, styled, svg
+from golem.robots.mujoco.balance import BalanceTrace
 
 ROW = 34.0
 """Height of one row of a figure [px]."""
@@ -234,16 +235,14 @@ def _map(records: Sequence[TrialRecord], summary: Summary) -> dict[str, list[tup
 
 def _margins(grouped: Mapping[str, Sequence[TrialRecord]], folder: Path) -> tuple[list[tuple[str, str]], str]:
     """Return the CoM margin over time, per method, of the trials that kept a trace, and boxes of its means."""
-    plots, boxes, short = list[tuple[str, str]](), list[margins.MarginBox](), short_names(grouped)
+    plots, traces, short = list[tuple[str, str]](), dict[str, list[BalanceTrace]](), short_names(grouped)
     for i, (method, rows) in enumerate(grouped.items()):
         kept = margins.kept_traces(rows, folder)
-        plot = margins.margin_plot([margins.MarginCurve(t, r.success) for r, t in kept[: margins.MAX_CURVES]], i)
+        plot = margins.margin_plot([(trace, r.success) for r, trace in kept], i)
         if plot:
             plots.append((short[method], plot))
-        box = margins.margin_box(short[method], [trace for _, trace in kept], i)
-        if box is not None:
-            boxes.append(box)
-    return plots, margins.margin_boxes(boxes)
+        traces[short[method]] = [trace for _, trace in kept]
+    return plots, margins.margin_boxes(traces)
 
 
 def _pictures(grouped: Mapping[str, Sequence[TrialRecord]], folder: Path) -> list[dict[str, Any]]:
