@@ -11,7 +11,7 @@ from golem.errors import ConfigError
 from golem.evaluation.episodes import episode as episodes
 from golem.evaluation.episodes.episode import Episode, legs_stack, with_legs
 from golem.evaluation.episodes.scripted_motion import WIDE_AREA, ArmMotion, ScriptedMotion
-from golem.evaluation.rungs.gate_limits import NOTHING, lifted
+from golem.evaluation.rungs.leg_rung import NOTHING, lifted
 from golem.hardware.safety.base import SafetyLimits
 from golem.interfaces import topics
 from golem.robots.mujoco.shoves import shove

@@ -9,7 +9,8 @@ import pytest
 
 from golem.errors import ConfigError
 from golem.evaluation.base import TrialOutcome, TrialSpec
-from golem.evaluation.rungs.gate_limits import GateLimits, GateLimitsOptions, lifted
+from golem.evaluation.rungs.leg_rung import lifted
+from golem.evaluation.rungs.push_limit import GateLimits, GateLimitsOptions
 from golem.hardware.safety.base import SafetyLimits
 
 STIFF = f"{Path(__file__).parents[1] / 'leg_methods.py'}:Stiff"

@@ -189,6 +189,9 @@ class PlainEpisode:
     def push(self, push: Push) -> None:
         self._pusher.begin(push, self.t, self.recorder.yaw)
 
+    def close(self) -> None:
+        """Release nothing: there are no images."""
+
     def _tick(self) -> None:
         state, base = self._robot.state(), self._robot.base()
         try:

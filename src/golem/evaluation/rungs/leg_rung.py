@@ -1,24 +1,75 @@
-"""What the rungs of lower bodies have in common: a standing stack, one lower body in it, one plant under it."""
+"""What the rungs of lower bodies have in common: a standing stack, one lower body in it, a plant, a safety gate."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
+import numpy as np
+
 from golem.capabilities.legs.base import Envelope
-from golem.errors import ConfigError
+from golem.errors import ConfigError, unknown_name
 from golem.evaluation.base import DONE, Rung, TrialOutcome, TrialSpec
 from golem.evaluation.episodes.episode import LATENCY, Episode, Loss, episode_seed, legs_stack
 from golem.evaluation.harness.arguments import robot_options
 from golem.hardware.safety.base import SafetyLimits
 from golem.provenance import stack_facts
 from golem.stack import Stack
+from golem.types import NUM_JOINTS
 
 NO_WALKER = "walk"
 """Stage in which a lower body fails that cannot walk."""
+
+
+Lift = Callable[[SafetyLimits], SafetyLimits]
+"""Returns limits of which some are lifted."""
+NOTHING = "nothing"
+"""The gate as it ships."""
+FAR = np.full(NUM_JOINTS, 1e3)
+"""Beyond every position [rad], speed [rad/s] and torque [N m] of a robot."""
+STOPS: dict[str, Lift] = {
+    "speed": lambda limits: replace(limits, velocity=FAR),
+    "range": lambda limits: replace(limits, state_lower=-FAR, state_upper=FAR),
+    "torque": lambda limits: replace(limits, torque_samples=10**9),
+    "tilt": lambda limits: replace(limits, tilt=math.pi),
+    "balance": lambda limits: replace(limits, capture=math.inf, sinking=math.inf, lean=math.inf, low=-math.inf),
+    "sender": lambda limits: replace(
+        limits,
+        sane=np.full_like(limits.sane, 1e6),
+        jolts=math.inf,
+        throw=(1e6, 1e6, 1e6),
+        hung=math.inf,
+        least_kp=np.full(NUM_JOINTS, 1e-9),
+        least_kd=np.zeros(NUM_JOINTS),
+    ),
+}
+"""What stops the robot: measured quantities, of which `range` is position and braking distance, and `sender`, commands
+that are far beyond the robot, jump, hang, or hold too little. No stiffness at all stays less than the least: targets of
+such motors mean nothing."""
+BOUNDS: dict[str, Lift] = {
+    "position": lambda limits: replace(limits, lower=-FAR, upper=FAR),
+    "slew": lambda limits: replace(limits, slew=FAR),
+    "effort": lambda limits: replace(limits, torque_command=FAR),
+    "gains": lambda limits: replace(limits, kp_max=1e3, kd_max=1e3, kp_rate=1e6, kd_rate=1e6),
+}
+"""Bounds to which commands are clipped; `effort` is the predicted torque of a command."""
+GROUPS = {NOTHING: (), "stops": tuple(STOPS), "bounds": tuple(BOUNDS)}
+"""Names for several of them."""
+
+
+def lifted(limits: SafetyLimits, names: str) -> SafetyLimits:
+    """Return `limits` without those of `names`, e.g. `stops+slew`. Raises ConfigError: there is no such limit."""
+    single = STOPS | BOUNDS
+    for name in names.split("+"):
+        if name not in GROUPS and name not in single:
+            raise unknown_name("limit", name, (*GROUPS, *single))
+        for each in GROUPS.get(name, (name,)):
+            limits = single[each](limits)
+    return limits
 
 
 @dataclass(frozen=True)
@@ -52,11 +103,11 @@ class LegRung(Rung[O]):
     walks: bool = False
     facts: Mapping[str, object] = {}
 
-    def _each(self, *options: str) -> None:
-        """Check options that name several things. Raises ConfigError: one names nothing, or something twice."""
-        for option in options:
-            names = getattr(self.options, option)
-            if not names or len(set(names)) < len(names):
+    def __init__(self, options: O | None = None) -> None:
+        """Take the options; None are the defaults. Raises ConfigError: one names nothing, or something twice."""
+        super().__init__(options)
+        for option, names in vars(self.options).items():
+            if isinstance(names, tuple) and option != "robot" and len(set(names)) < max(len(names), 1):
                 raise ConfigError(f"--{option} names nothing, or one of them twice.")
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
@@ -84,14 +135,15 @@ class LegRung(Rung[O]):
         """Return the stack of a trial, for a rung whose cases differ in it."""
         return self.stack(spec.method, spec.profile, spec.overrides)
 
-    def limits(self, spec: TrialSpec, stack: Stack) -> SafetyLimits | None:
-        """Return what the gate of a trial enforces; None is what its `stack` says."""
-        return None
+    def lifts(self, spec: TrialSpec) -> str:
+        """Return which limits of the gate are lifted in a trial; see `lifted`."""
+        return NOTHING
 
     def episode(self, spec: TrialSpec) -> Episode:
         """Return the robot of a trial, which is to stand at the height that was asked for."""
         stack = self.trial_stack(spec)
-        episode = Episode(stack, episode_seed(spec.seed, spec.index), self.onlooker, self.limits(spec, stack))
+        limits = lifted(SafetyLimits.from_profile(stack.limits), self.lifts(spec))
+        episode = Episode(stack, episode_seed(spec.seed, spec.index), self.onlooker, limits)
         episode.height = self.options.height
         return episode
 

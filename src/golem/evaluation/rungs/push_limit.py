@@ -1,9 +1,11 @@
-"""Rung `push-limit`: the largest push that a lower body survives, by direction and moment."""
+"""Rungs `push-limit` and `gate-limits`: the largest push that a lower body survives, and what the gate costs of it."""
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -14,19 +16,17 @@ from golem.errors import ConfigError
 from golem.evaluation.base import Case, Outcomes, Results, TrialOutcome, TrialSpec
 from golem.evaluation.episodes.plain_episode import PlainEpisode, own_legs
 from golem.evaluation.harness.arguments import robot_options
-from golem.evaluation.metrics.statistics import wilson
+from golem.evaluation.metrics.statistics import Interval, clustered, wilson
 from golem.evaluation.metrics.text_table import TextTable, short_names
 from golem.evaluation.report.svg_figure import method_colour
-from golem.evaluation.rungs.gate_limits import NOTHING, lifted
-from golem.evaluation.rungs.leg_rung import NO_WALKER, can_walk
-from golem.evaluation.rungs.pushed_rung import Gait, PushedOptions, PushedRung, gait_name
+from golem.evaluation.rungs.leg_rung import BOUNDS, NO_WALKER, NOTHING, lifted
+from golem.evaluation.rungs.pushed_rung import Gait, PushedEpisode, PushedOptions, PushedRung, gait_name
 from golem.hardware.safety.base import SafetyLimits
 from golem.robots.mujoco.shoves import DIRECTIONS
-from golem.stack import Stack
 
 Terms = Literal["stack", "unstopped", "ungated", "own"]
 LIFTED: dict[str, str] = {"stack": NOTHING, "unstopped": "stops", "ungated": "stops+bounds"}
-"""What is lifted of the gate on each of the stack's terms; see `gate_limits.lifted`."""
+"""What is lifted of the gate on each of the stack's terms; see `lifted`."""
 Trial = tuple[TrialSpec, TrialOutcome]
 SURVIVED = 0.95
 """Share of the trials of a level that has to be survived."""
@@ -62,7 +62,6 @@ class PushLimit(PushedRung[PushLimitOptions]):
                 raise ConfigError(f"--{option} is {value:g}; it must be more than 0.")
         if o.last < o.first:
             raise ConfigError(f"--last is {o.last:g}; it must be at least --first, {o.first:g}.")
-        self._each("terms")
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
         if "own" in self.options.terms:
@@ -104,21 +103,17 @@ class PushLimit(PushedRung[PushLimitOptions]):
             following = o.first - o.step if level == o.first and NO_WALKER not in losses else None
         return following if following is not None and 1e-9 < following <= o.last + 1e-9 else None
 
-    def together(self, spec: TrialSpec) -> Hashable:
-        return spec.method, spec.index, spec.case["terms"], spec.case["phase"], spec.case["walk"]
+    def lifts(self, spec: TrialSpec) -> str:
+        return LIFTED[str(spec.case["terms"])]
 
-    def limits(self, spec: TrialSpec, stack: Stack) -> SafetyLimits:
-        return lifted(SafetyLimits.from_profile(stack.limits), LIFTED[str(spec.case["terms"])])
-
-    def pushed(self, specs: Sequence[TrialSpec]) -> Sequence[TrialOutcome]:
-        spec = specs[0]
+    def robot(self, spec: TrialSpec) -> PushedEpisode:
         if spec.case["terms"] != "own":
-            return super().pushed(specs)
+            return super().robot(spec)
         path = robot_options(self.options.robot).get("mjcf")
         plain = PlainEpisode(spec.method, None if path is None else Path(path), spec.rng("start"))
         if self.options.height is not None:
             plain.lower(self.options.height)
-        return self.from_moment(specs, plain, can_walk(plain.envelope), self.moment(spec).reach_plainly)
+        return plain
 
     def tables(self, outcomes: Outcomes) -> Sequence[TextTable]:
         o, unit = self.options, "N s" if self.options.kind == "shove" else "N"
@@ -208,3 +203,76 @@ def limit(trials: Sequence[Trial]) -> tuple[float, str]:
     best = max((level for level, losses in levels.items() if survived(losses)), default=0.0)
     lost = any(not survived(losses) for losses in levels.values())
     return best, f"{best:g}" if lost else f">= {best:g}"
+
+
+@dataclass(frozen=True)
+class GateLimitsOptions(PushedOptions):
+    """The pushes, and which limits are lifted."""
+
+    direction: tuple[str, ...] = ("front", "left", "back", "right")
+    """Where the push drives the robot."""
+    level: tuple[float, ...] = (30.0, 60.0)
+    """Sizes of the push."""
+    lift: tuple[str, ...] = (NOTHING, "stops", "bounds", *(f"stops+{name}" for name in (*BOUNDS, "bounds")))
+    """What is lifted: speed, range, torque, tilt, balance, sender (stops), position, slew, effort, gains (bounds), with
+    a + between."""
+
+
+class GateLimits(PushedRung[GateLimitsOptions]):
+    """Survive pushes with one limit of the safety gate after another lifted: which of them cost the recovery?"""
+
+    name = "gate-limits"
+    Options = GateLimitsOptions
+    adaptive = True
+
+    def __init__(self, options: GateLimitsOptions | None = None) -> None:
+        super().__init__(options)
+        for names in self.options.lift:
+            lifted(SafetyLimits.from_profile(), names)
+
+    def cases(self, results: Results) -> Sequence[Case]:
+        o = self.options
+        return [
+            {"lift": lift, "phase": phase, "walk": walk, "direction": direction, "level": level}
+            for lift, (phase, walk), direction, level in itertools.product(o.lift, self.gaits, o.direction, o.level)
+        ]
+
+    def lifts(self, spec: TrialSpec) -> str:
+        return str(spec.case["lift"])
+
+    def tables(self, outcomes: Outcomes) -> Sequence[TextTable]:
+        rows, short, o = list[tuple[str, ...]](), short_names(outcomes), self.options
+        for method, gait, level, lift in itertools.product(outcomes, self.gaits, o.level, o.lift):
+            want = {"lift": lift, "phase": gait[0], "walk": gait[1], "level": level}
+            mine = [(spec, outcome) for spec, outcome in outcomes[method] if want.items() <= spec.case.items()]
+            robots: dict[int, list[bool]] = {}
+            for spec, outcome in mine:
+                robots.setdefault(spec.index, []).append(outcome.success)
+            interval = clustered(list(robots.values())) if mine else Interval(0.0, 1.0)
+            survived = f"{sum(map(sum, robots.values()))} of {len(mine)} {interval.text(100.0)}"
+            ends = _ends([outcome for _, outcome in mine])
+            rows.append((short[method], gait_name(gait), f"{level:g}", lift, survived, ends))
+        return (
+            TextTable(
+                "Pushes survived where a limit of the gate is lifted, all directions together",
+                ("lower body", "phase", "push", "lifted", "survived [%]", "the others ended by"),
+                tuple(rows),
+                "A fall is judged on the simulator's truth; everything else is a stop of the gate. One robot is "
+                "pushed in all directions from one past: the interval counts robots, not pushes.",
+            ),
+        )
+
+
+def _ends(outcomes: Sequence[TrialOutcome]) -> str:
+    """Return what ended the trials that were lost, the most frequent first."""
+    ends = Counter(_end(outcome) for outcome in outcomes if not outcome.success)
+    return ", ".join(f"{end} {count}" for end, count in ends.most_common())
+
+
+def _end(outcome: TrialOutcome) -> str:
+    """Return the reason of a safety stop with its joint and without side and figures, or the stage."""
+    if outcome.stage != "safety":
+        return outcome.stage
+    reason = outcome.detail.partition(": ")[2]
+    words = reason.replace(":", "").split()
+    return " ".join(words[:2]).replace("left_", "").replace("right_", "")

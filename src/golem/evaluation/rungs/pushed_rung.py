@@ -7,7 +7,7 @@ The robot is one of the stack (`Episode`), with its gate, estimator, latency and
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Hashable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
@@ -59,29 +59,27 @@ class Moment:
     late: float
 
     @classmethod
-    def of(cls, spec: TrialSpec, phase: Phase, twist: Twist) -> Moment:
+    def of(cls, spec: TrialSpec) -> Moment:
         """Return the moment that a trial draws."""
+        phase: Phase = spec.case["phase"]  # type: ignore[assignment] - checked when the options were read
+        twist = Twist() if phase == "standing" else walk_twist(str(spec.case["walk"]))
         times = spec.rng("times")
         return cls(phase, twist, times.uniform(*SETTLE), times.uniform(0.0, SWING))
 
-    def reach(self, spec: TrialSpec, episode: Episode) -> Loss | None:
-        """Bring the robot of a stack there, its arms moving; return how it was lost before, or None."""
-        motion = ScriptedMotion(ArmMotion(spec.rng("arms")))
-        episode.start(motion)
-        episode.stand(self.settle)
-        if self.phase != "standing":
-            motion.twist = lambda t: self.twist
-        return self._walk(episode)
-
-    def reach_plainly(self, episode: PlainEpisode) -> Loss | None:
-        """Bring a robot on its own terms there; return how it was lost before, or None."""
-        episode.run(self.settle)
-        if self.phase != "standing":
-            episode.twist = self.twist
-        return self._walk(episode)
-
-    def _walk(self, episode: PushedEpisode) -> Loss | None:
-        if self.phase != "standing":
+    def reach(self, spec: TrialSpec, episode: PushedEpisode) -> Loss | None:
+        """Bring a robot there, that of a stack with its arms moving; return how it was lost before, or None."""
+        walks = self.phase != "standing"
+        if isinstance(episode, PlainEpisode):
+            episode.run(self.settle)
+            if walks:
+                episode.twist = self.twist
+        else:
+            motion = ScriptedMotion(ArmMotion(spec.rng("arms")))
+            episode.start(motion)
+            episode.stand(self.settle)
+            if walks:
+                motion.twist = lambda t: self.twist
+        if walks:
             episode.run(self.settle)
             if self.phase != "walking" and not self._swing(episode):
                 return episode.loss or NO_STEP
@@ -164,7 +162,6 @@ class PushedRung(LegRung[O]):
         for name in self.options.direction:
             if name not in DIRECTIONS:
                 raise unknown_name("direction", name, DIRECTIONS)
-        self._each("phase", "direction", "walk")
         for word in self.options.walk:
             walk_twist(word)
 
@@ -174,44 +171,34 @@ class PushedRung(LegRung[O]):
         o = self.options
         return [(p, walk) for p in o.phase for walk in ((STILL,) if p == "standing" else o.walk)]
 
+    def together(self, spec: TrialSpec) -> Hashable:
+        """Return what trials share that have one past: all but level and direction."""
+        past = (value for name, value in spec.case.items() if name not in ("level", "direction"))
+        return spec.method, spec.index, *past
+
     def run_together(self, specs: Sequence[TrialSpec]) -> Sequence[TrialOutcome]:
         """Bring one robot to the moment of the push, and push it from there, each time in a copy of the process."""
         if len(specs) > 1 and not CAN_COPY:
             return [self.run(spec, None) for spec in specs]
-        return self.pushed(specs)
-
-    def pushed(self, specs: Sequence[TrialSpec]) -> Sequence[TrialOutcome]:
-        """Push the robot of a stack, in all the ways that `specs` say."""
         spec = specs[0]
-        with closing(self.episode(spec)) as episode:
-            walks = can_walk(episode.running.envelope)
-            return self.from_moment(specs, episode, walks, partial(self.moment(spec).reach, spec))
+        with closing(self.robot(spec)) as episode:
+            envelope = episode.envelope if isinstance(episode, PlainEpisode) else episode.running.envelope
+            if spec.case["phase"] != "standing" and not can_walk(envelope):
+                return [no_walker(each.method) for each in specs]
+            loss = Moment.of(spec).reach(spec, episode)
+            if loss is not None:
+                return [judged(each.method, loss, {}) for each in specs]
+            if len(specs) == 1:
+                return [self._push(episode, spec)]
+            return [in_a_copy(partial(self._push, episode, each)) for each in specs]
 
-    def moment(self, spec: TrialSpec) -> Moment:
-        """Return when the push of a trial comes."""
-        phase: Phase = spec.case["phase"]  # type: ignore[assignment] - checked when the options were read
-        twist = Twist() if phase == "standing" else walk_twist(str(spec.case["walk"]))
-        return Moment.of(spec, phase, twist)
-
-    def from_moment(
-        self, specs: Sequence[TrialSpec], episode: PushedEpisode, walks: bool, reach: Callable[..., Loss | None]
-    ) -> Sequence[TrialOutcome]:
-        """Bring a robot to the moment by `reach`, and push it from there."""
-        if specs[0].case["phase"] != "standing" and not walks:
-            return [no_walker(spec.method) for spec in specs]
-        loss = reach(episode)
-        if loss is not None:
-            return [judged(spec.method, loss, {}) for spec in specs]
-        if len(specs) == 1:
-            return [self._push(episode, specs[0])]
-        return [in_a_copy(partial(self._push, episode, spec)) for spec in specs]
+    def robot(self, spec: TrialSpec) -> PushedEpisode:
+        """Return the robot that is pushed: that of the stack."""
+        return self.episode(spec)
 
     def _push(self, episode: PushedEpisode, spec: TrialSpec) -> TrialOutcome:
-        make = shove if self.options.kind == "shove" else rod
-        push, standing = (
-            make(str(spec.case["direction"]), float(spec.case["level"])),
-            spec.case["phase"] == "standing",
-        )
+        make, standing = shove if self.options.kind == "shove" else rod, spec.case["phase"] == "standing"
+        push = make(str(spec.case["direction"]), float(spec.case["level"]))
         start, loss = episode.t, None
         try:
             episode.push(push)

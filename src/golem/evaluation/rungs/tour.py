@@ -24,8 +24,7 @@ from golem.evaluation.episodes.scripted_motion import ScriptedMotion
 from golem.evaluation.metrics.statistics import Interval, PairedTable, mcnemar, mean_interval, paired_difference
 from golem.evaluation.metrics.text_table import TextTable, short_names
 from golem.evaluation.report.svg_figure import method_colour
-from golem.evaluation.rungs.gate_limits import lifted
-from golem.evaluation.rungs.leg_rung import NO_WALKER, LegRung, PlantOptions, can_walk, judged
+from golem.evaluation.rungs.leg_rung import NO_WALKER, LegRung, PlantOptions, can_walk, judged, lifted
 from golem.hardware.safety.base import SafetyLimits
 from golem.interfaces import topics
 from golem.interfaces.payloads import JointTrajectory
@@ -147,7 +146,6 @@ class Tour(LegRung[TourOptions]):
 
     def __init__(self, options: TourOptions | None = None) -> None:
         super().__init__(options)
-        self._each("engine")
         lifted(SafetyLimits.from_profile(), self.options.lift)
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
@@ -159,8 +157,8 @@ class Tour(LegRung[TourOptions]):
     def trial_stack(self, spec: TrialSpec) -> Stack:
         return self.stack(spec.method, spec.profile, {**spec.overrides, "robot": str(spec.case["engine"])})
 
-    def limits(self, spec: TrialSpec, stack: Stack) -> SafetyLimits:
-        return lifted(SafetyLimits.from_profile(stack.limits), self.options.lift)
+    def lifts(self, spec: TrialSpec) -> str:
+        return self.options.lift
 
     def trial(self, spec: TrialSpec, episode: Episode) -> TrialOutcome:
         robot = episode.robot

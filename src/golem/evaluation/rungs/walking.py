@@ -64,7 +64,6 @@ class WalkRough(LegRung[WalkRoughOptions]):
 
     def __init__(self, options: WalkRoughOptions | None = None) -> None:
         super().__init__(options)
-        self._each("ground")
         for ground in self.options.ground:
             if ground not in GROUNDS:
                 raise unknown_name("ground", ground, GROUNDS)
