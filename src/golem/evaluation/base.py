@@ -27,6 +27,8 @@ from golem.options import fill
 DONE = "done"
 """The stage of a trial that lost nothing."""
 
+Key = tuple[str, str, int]
+"""What tells a trial from the others of its run: method, name of the case, and index."""
 Case = Mapping[str, float | str]
 """A condition under which a rung repeats its trials, e.g. `{"direction": "left", "level": 40.0}`; empty for most. All
 cases of a rung have the same names, in the same order."""
@@ -59,8 +61,8 @@ class TrialSpec:
     case: Case = field(default_factory=dict[str, "float | str"])
 
     @property
-    def key(self) -> tuple[str, str, int]:
-        """What tells a trial from the others of its run: method, case and index."""
+    def key(self) -> Key:
+        """What tells it from the others of its run."""
         return self.method, case_name(self.case), self.index
 
     def rng(self, stream: str) -> np.random.Generator:

@@ -10,7 +10,6 @@ import pytest
 from golem.evaluation.metrics.anytime import (
     anytime_interval,
     anytime_p,
-    bounded_interval,
     confidence_sequence,
     difference_interval,
     equal_within,
@@ -71,7 +70,7 @@ def test_a_sequence_never_widens_and_holds_the_grid_safely() -> None:
 def test_nothing_and_everything_have_a_width() -> None:
     assert anytime_interval([1.0] * 60).low < 0.95 and anytime_interval([1.0] * 60).high == 1.0
     assert anytime_interval([0.0] * 60).low == 0.0 and anytime_interval([0.0] * 60).high > 0.05
-    two = bounded_interval([0.5, 0.5])
+    two = anytime_interval([0.5, 0.5], n=2)
     assert two.low < 0.2 and two.high > 0.8
     both = difference_interval([1.0] * 10, [1.0] * 10)
     assert both.low < 0.0 < both.high

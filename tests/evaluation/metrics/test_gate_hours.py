@@ -14,8 +14,8 @@ from golem.evaluation.metrics.results import GateHours, ResultsConfig, run_resul
 
 
 def test_hours_and_stops_add_up() -> None:
-    one = GateHours.of([{"active": 1800.0, "stops": {"tilt": 1}}, {"wall": 3.0}])
-    both = one + GateHours.of([{"active": 5400.0, "stops": {"tilt": 1, "joint_torque": 1}}])
+    one, other = {"active": 1800.0, "stops": {"tilt": 1}}, {"active": 5400.0, "stops": {"tilt": 1, "joint_torque": 1}}
+    both = GateHours.of([one, {"wall": 3.0}, other])
     assert (both.trials, both.active) == (2, 7200.0)
     assert both.sentence().startswith(
         "Safety gate: 2 robot hours open in 2 trials, 3 stops (`tilt` 2, `joint_torque` 1);"

@@ -14,14 +14,14 @@ import numpy as np
 from tyro.conf import Positional, arg
 
 from golem.errors import ConfigError, unknown_name
-from golem.evaluation.base import rung_class
+from golem.evaluation.base import Key, rung_class
 from golem.evaluation.blame.game import EXACT, Coalition, Points, Strata, coalitions, orders_of, points, shapley
 from golem.evaluation.blame.oracles import ORACLES, NotHere
 from golem.evaluation.harness.ladder import LadderConfig, prepare, read_ladder, run_ladder
 from golem.evaluation.harness.records import Provenance, TrialRecord
 from golem.evaluation.harness.run_folder import RunFolder, finished_records
 from golem.evaluation.harness.trial_executor import TrialExecutor, make_executor
-from golem.evaluation.harness.trial_runner import Key, Request, Runner
+from golem.evaluation.harness.trial_runner import Request, Runner
 from golem.evaluation.metrics.statistics import wilson
 from golem.evaluation.metrics.text_table import TextTable
 from golem.options import fill

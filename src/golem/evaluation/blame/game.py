@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from golem.evaluation.metrics.statistics import Interval, wilson
+from golem.evaluation.metrics.statistics import Interval, difference, wilson
 
 Coalition = frozenset[str]
 EXACT = 6
@@ -85,12 +85,8 @@ def _mover(cells: Sequence[tuple[float, float]], level: float) -> Interval:
     ends = [wilson(share * u, u, level) if 0.0 < u < math.inf else Interval(0.0, float(u == 0.0)) for share, u in cells]
     product = (1.0 - p) * (1.0 - q)
     r = -math.sqrt(p * q / product) if product > 0.0 else 0.0
-
-    def reach(a: float, b: float) -> float:
-        return math.sqrt(max(a * a - 2.0 * r * a * b + b * b, 0.0))
-
-    low = p - q - reach(p - ends[0].low, ends[1].high - q)
-    return Interval(max(low, -1.0), min(p - q + reach(ends[0].high - p, q - ends[1].low), 1.0))
+    found = difference(p, ends[0], q, ends[1], r)
+    return Interval(max(found.low, -1.0), min(found.high, 1.0))
 
 
 def orders_of(players: Sequence[str], rng: np.random.Generator) -> list[tuple[str, ...]]:

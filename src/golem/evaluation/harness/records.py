@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from golem.errors import OutputError, shorten
-from golem.evaluation.base import Case, TrialOutcome, TrialSpec, case_name
+from golem.evaluation.base import Case, Key, TrialOutcome, TrialSpec, case_name
 from golem.provenance import digest
 
 SCHEMA = 2
@@ -63,7 +63,7 @@ class TrialRecord:
     trace: str | None
 
     @property
-    def key(self) -> tuple[str, str, int]:
+    def key(self) -> Key:
         return self.method, case_name(self.case), self.index
 
     @property
@@ -173,7 +173,7 @@ def read_records(path: Path) -> list[TrialRecord]:
         return []
     except OSError as error:
         raise OutputError(f"Cannot read {path}: {error.strerror}.") from error
-    records: dict[tuple[str, str, int], TrialRecord] = {}
+    records: dict[Key, TrialRecord] = {}
     for number, line in enumerate(text[: whole_lines(text)].splitlines(), start=1):
         try:
             record = TrialRecord.parse(line.decode())

@@ -15,7 +15,7 @@ from typing import Any
 from tqdm import tqdm
 
 from golem.errors import GolemError
-from golem.evaluation.base import Case, Rung, TrialOutcome, TrialSpec, case_name
+from golem.evaluation.base import Case, Key, Rung, TrialOutcome, TrialSpec, case_name
 from golem.evaluation.harness.records import Provenance, TrialRecord
 from golem.evaluation.harness.run_folder import Finished, RunFolder
 from golem.evaluation.harness.trial_executor import TrialExecutor
@@ -75,8 +75,6 @@ CRASH = "crash"
 """Stage of a trial whose process died."""
 TIMEOUT = "timeout"
 """Stage of a trial that outlasted its limit."""
-Key = tuple[str, str, int]
-"""Method, name of the case, and index of a trial."""
 
 
 @dataclass(frozen=True, slots=True)

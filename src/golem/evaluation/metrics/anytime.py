@@ -63,22 +63,18 @@ def confidence_sequence(values: ArrayLike, alpha: float = ALPHA, n: int | None =
     return ends[0], np.maximum(ends[1], ends[0])
 
 
-def anytime_interval(values: ArrayLike, alpha: float = ALPHA) -> Interval:
-    """Return the confidence sequence's interval after all `values`, (T,) between 0 and 1, at least one."""
-    low, high = confidence_sequence(values, alpha)
+def anytime_interval(values: ArrayLike, n: int | None = None) -> Interval:
+    """Return the confidence sequence's 95 % interval after all `values`, (T,) between 0 and 1, at least one.
+
+    No distribution is assumed; `n` is their number where it was fixed in advance.
+    """
+    low, high = confidence_sequence(values, n=n)
     return Interval(float(low[-1]), float(high[-1]))
 
 
-def bounded_interval(values: ArrayLike, alpha: float = ALPHA) -> Interval:
-    """Return the interval of the mean of (n,) values between 0 and 1, n fixed in advance; no distribution assumed."""
-    x = np.asarray(values, np.float64)
-    low, high = confidence_sequence(x, alpha, len(x))
-    return Interval(float(low[-1]), float(high[-1]))
-
-
-def difference_interval(a: ArrayLike, b: ArrayLike, alpha: float = ALPHA) -> Interval:
+def difference_interval(a: ArrayLike, b: ArrayLike) -> Interval:
     """Return the confidence sequence's interval of the mean of `a` minus that of `b`, (T,) pairs between 0 and 1."""
-    found = anytime_interval((1.0 + np.asarray(a, np.float64) - np.asarray(b, np.float64)) / 2.0, alpha)
+    found = anytime_interval((1.0 + np.asarray(a, np.float64) - np.asarray(b, np.float64)) / 2.0)
     return Interval(2.0 * found.low - 1.0, 2.0 * found.high - 1.0)
 
 

@@ -9,13 +9,11 @@ from pathlib import Path
 from tyro.conf import Positional
 
 from golem.errors import ConfigError
+from golem.evaluation.base import Key
 from golem.evaluation.harness.records import TrialRecord
 from golem.evaluation.harness.run_folder import finished_records
 from golem.evaluation.metrics.summary import Summary, comparisons_of, row
 from golem.evaluation.metrics.tables import run_tables
-
-Key = tuple[str, str, int]
-"""Method, name of the case, and index of a trial."""
 
 
 @dataclass(frozen=True)

@@ -47,9 +47,6 @@ class GateHours:
             stops.update(line["stops"])
         return cls(len(counted), sum(float(line["active"]) for line in counted), stops)
 
-    def __add__(self, other: GateHours) -> GateHours:
-        return GateHours(self.trials + other.trials, self.active + other.active, self.stops + other.stops)
-
     @property
     def most_per_hour(self) -> float:
         """Upper bound of the stops per robot hour, one-sided, 95 % (exact, of a Poisson process); inf without time."""
@@ -97,7 +94,7 @@ def run_results(config: ResultsConfig) -> str:
         text = trials_csv([record for folder in config.runs for record in finished_records(folder)])
     else:
         parts = [section(folder, config.format == "latex") for folder in config.runs]
-        total = sum((gate_hours(folder) for folder in config.runs), GateHours())
+        total = GateHours.of(line for folder in config.runs for line in gate_costs(folder))
         if len(parts) > 1 and total.trials:
             parts.append(f"{'% ' if config.format == 'latex' else ''}In all. {total.sentence()}")
         text = "\n\n".join(parts) + "\n"
@@ -148,7 +145,7 @@ def section(folder: Path, latex: bool = False) -> str:
         f"seed {first.seed}, commit `{commits[0]}`:"
     )
     command = read_facts(folder).get("command", "")
-    hours = gate_hours(folder)
+    hours = GateHours.of(gate_costs(folder))
     gates = hours.sentence() if hours.trials else ""
     if latex:
         parts = [*(f"% {line}" for line in (head, command, gates) if line), *(table.latex() for table in tables)]
@@ -157,12 +154,12 @@ def section(folder: Path, latex: bool = False) -> str:
     return "\n\n".join(part for part in parts if part)
 
 
-def gate_hours(folder: Path) -> GateHours:
-    """Return what the gates of a run folder did, nothing if provoked. Raises OutputError: it has no trial records."""
+def gate_costs(folder: Path) -> list[dict[str, Any]]:
+    """Return a run's costs, none where stops are provoked. Raises OutputError: the folder has no trial records."""
     records = read_records(folder / "trials.jsonl")
     if not records or make_rung(RUNGS[records[0].rung], records[0].options).provokes:
-        return GateHours()
-    return GateHours.of(read_costs(folder))
+        return []
+    return read_costs(folder)
 
 
 def _paired(records: Sequence[TrialRecord]) -> bool:

@@ -183,7 +183,7 @@ def sequential_tables(rates: Mapping[str, Array], found: Sequence[Decision], rul
 
 
 def _fixed(x: Array) -> Interval:
-    return wilson(float(x.sum()), len(x)) if np.isin(x, (0.0, 1.0)).all() else anytime.bounded_interval(x)
+    return wilson(float(x.sum()), len(x)) if np.isin(x, (0.0, 1.0)).all() else anytime_interval(x, len(x))
 
 
 def _verdict(d: Decision, rule: StopRule) -> str:

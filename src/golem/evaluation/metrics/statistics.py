@@ -102,30 +102,33 @@ def mcnemar(table: PairedTable) -> float:
     return float(binomtest(table.only_a, discordant, 0.5).pvalue)
 
 
-def paired_difference(table: PairedTable, confidence: float = 0.95) -> Interval:
-    """Return the interval of the difference of success rates, A minus B, of paired trials.
+def paired_difference(table: PairedTable) -> Interval:
+    """Return the 95 % interval of the difference of success rates, A minus B, of paired trials.
 
     Method 10 of Newcombe, Statistics in Medicine 17 (1998) 2635: the two Wilson intervals, joined by the
     continuity-corrected correlation of the pairs. Needs at least one pair.
     """
     n = table.n
     a, b = table.both + table.only_a, table.both + table.only_b
-    wilson_a, wilson_b = wilson(a, n, confidence), wilson(b, n, confidence)
+    wilson_a, wilson_b = wilson(a, n), wilson(b, n)
     rate_a, rate_b = a / n, b / n
     determinant = table.both * table.neither - table.only_a * table.only_b
     if determinant > 0:
         determinant = max(determinant - n / 2, 0)
     product = a * (n - a) * b * (n - b)
-    phi = determinant / math.sqrt(product) if product else 0.0
+    return difference(rate_a, wilson_a, rate_b, wilson_b, determinant / math.sqrt(product) if product else 0.0)
+
+
+def difference(a: float, of_a: Interval, b: float, of_b: Interval, r: float) -> Interval:
+    """Return the interval of `a` minus `b` by the interval of each, and the correlation `r` of the two.
+
+    MOVER of Zou and Donner, Statistics in Medicine 27 (2008) 1693.
+    """
 
     def reach(da: float, db: float) -> float:
-        return math.sqrt(max(da * da - 2 * phi * da * db + db * db, 0.0))
+        return math.sqrt(max(da * da - 2.0 * r * da * db + db * db, 0.0))
 
-    difference = rate_a - rate_b
-    return Interval(
-        difference - reach(rate_a - wilson_a.low, wilson_b.high - rate_b),
-        difference + reach(wilson_a.high - rate_a, rate_b - wilson_b.low),
-    )
+    return Interval(a - b - reach(a - of_a.low, of_b.high - b), a - b + reach(of_a.high - a, b - of_b.low))
 
 
 def holm(p_values: Sequence[float]) -> list[float]:
@@ -160,37 +163,35 @@ def distribution(values: Sequence[float], low: float = -math.inf, high: float = 
     )
 
 
-def mean_interval(
-    values: Sequence[float], low: float = -math.inf, high: float = math.inf, confidence: float = 0.95
-) -> Interval | None:
-    """Return the interval of the mean of `values`, which must lie between `low` and `high`.
+def mean_interval(values: Sequence[float], low: float = -math.inf, high: float = math.inf) -> Interval | None:
+    """Return the 95 % interval of the mean of `values`, which must lie between `low` and `high`.
 
     Of values that are each 0 or 1, and can be nothing beyond, it is Wilson's; of values between two bounds it is
-    `bounded_interval`, which assumes no distribution. Else it is Student's t, cut at the bound: what cannot be is taken
-    out of an interval without a loss of coverage. None for values that are all alike, which say nothing about how they
-    spread.
+    `anytime_interval` for so many, which assumes no distribution. Else it is Student's t, cut at the bound: what cannot
+    be is taken out of an interval without a loss of coverage. None for values that are all alike, which say nothing
+    about how they spread.
     """
     n = len(values)
     if n and (low, high) == (0.0, 1.0) and set(values) <= {0.0, 1.0}:
-        return wilson(sum(values), n, confidence)
+        return wilson(sum(values), n)
     if n and math.isfinite(low) and math.isfinite(high):
-        from golem.evaluation.metrics.anytime import bounded_interval
+        from golem.evaluation.metrics.anytime import anytime_interval
 
-        found = bounded_interval((np.array(values) - low) / (high - low), 1.0 - confidence)
+        found = anytime_interval((np.array(values) - low) / (high - low), n=n)
         return Interval(low + (high - low) * found.low, low + (high - low) * found.high)
     if len(set(values)) < 2:
         return None
     from scipy.stats import t as student
 
-    half = float(student.ppf(0.5 + confidence / 2, n - 1) * np.std(values, ddof=1) / math.sqrt(n))
+    half = float(student.ppf(0.975, n - 1) * np.std(values, ddof=1) / math.sqrt(n))
     mean = float(np.mean(values))
     return Interval(max(mean - half, low), min(mean + half, high))
 
 
-def _median_interval(ordered: Sequence[float], confidence: float = 0.95) -> Interval | None:
-    """Return the interval of the median between two order statistics (Conover, Practical Nonparametric Statistics)."""
+def _median_interval(ordered: Sequence[float]) -> Interval | None:
+    """Return the median's 95 % interval between two order statistics (Conover, Practical Nonparametric Statistics)."""
     n = len(ordered)
     from scipy.stats import binom
 
-    rank = int(binom.ppf((1 - confidence) / 2, n, 0.5))
+    rank = int(binom.ppf(0.025, n, 0.5))
     return Interval(ordered[rank - 1], ordered[n - rank]) if rank >= 1 else None

@@ -67,9 +67,9 @@ def styled() -> Any:
     return matplotlib.rc_context(_STYLE)
 
 
-def page_figure(height: float, width: float = WIDTH) -> Any:
+def page_figure(height: float) -> Any:
     """Return an empty figure of the page; call it, and `svg`, within `styled`."""
-    return blank_figure(width, height, facecolor="none")
+    return blank_figure(WIDTH, height, facecolor="none")
 
 
 def svg(figure: Any, label: str) -> str:
@@ -90,8 +90,7 @@ def svg(figure: Any, label: str) -> str:
 
 def standalone(picture: str) -> str:
     """Return a figure of the page as the text of an SVG file, in the colours of the page by day."""
-    css = resources.files("golem.evaluation.report").joinpath("report.css").read_text(encoding="utf-8")
-    colours = dict(reversed(re.findall(r"--(\w+):\s*(#[0-9a-fA-F]+)", css)))  # the first of each name is by day
+    colours = dict(reversed(re.findall(r"--(\w+):\s*(#[0-9a-fA-F]+)", style())))  # the first of each name is by day
     picture = re.sub(r"var\(--(\w+)\)", lambda match: colours[match[1]], picture)
     names = 'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink"'
     picture = picture.replace("font-family: inherit", "font-family: sans-serif")

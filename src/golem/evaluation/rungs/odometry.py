@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from golem import registry
 from golem.capabilities.odometry.base import LidarOdometry, OdometryEstimate
-from golem.evaluation.base import DONE, Rung, TrialOutcome, TrialSpec
+from golem.evaluation.base import DONE, Key, Rung, TrialOutcome, TrialSpec
 from golem.evaluation.episodes import lidar_walk
 from golem.evaluation.episodes.episode import legs_stack
 from golem.interfaces import lidar_convert, public
@@ -175,7 +175,7 @@ class OdometryRung(Rung[OdometryOptions]):
             overrides=first.overrides,
             onlooker=self.onlooker,
         )
-        outcomes: dict[tuple[str, str, int], TrialOutcome] = {}
+        outcomes: dict[Key, TrialOutcome] = {}
         for name in dict.fromkeys(spec.case["case"] for spec in specs):
             group = [spec for spec in specs if spec.case["case"] == name]
             heard = readings(walk, group[0])
