@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from golem.evaluation.base import TrialSpec
-from golem.evaluation.rungs import navigate_line
-from golem.evaluation.rungs.navigate_line import NavigateLine
+from golem.evaluation.rungs import navigate_hall
+from golem.evaluation.rungs.navigate_hall import NavigateLine
 
 STIFF = f"{Path(__file__).parents[1] / 'leg_methods.py'}:Stiff"
 
@@ -26,7 +26,7 @@ def test_a_lower_body_that_cannot_walk_is_not_sent(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_ours_walks_a_line_and_is_judged_where_it_truly_stands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(navigate_line, "DISTANCE", 1.5)
+    monkeypatch.setattr(navigate_hall, "DISTANCE", 1.5)
     outcome = NavigateLine().run(spec("almi"), tmp_path / "trial")
     assert outcome.success, outcome.detail
     assert outcome.series["goal_radial"] < 0.2

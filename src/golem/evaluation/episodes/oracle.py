@@ -31,7 +31,6 @@ class ContactWatch:
 
     Attributes:
         touched: `LINK on BODY` of every pair that was in contact, with the time of the first [s].
-        places: where that was in the world, (3,) each [m].
     """
 
     def __init__(self, robot: MujocoRobot) -> None:
@@ -44,7 +43,6 @@ class ContactWatch:
         self._kind: list[int] = kinds.tolist()
         self._told = robot.watch_contacts(kinds)
         self.touched: dict[str, float] = {}
-        self.places: dict[str, tuple[float, float, float]] = {}
 
     def due(self) -> float:
         """Return when it has to look again [s]: after every tick, unless the robot tells of contacts."""
@@ -52,16 +50,23 @@ class ContactWatch:
 
     def __call__(self, t: float) -> None:
         contact, kind = self._robot.data.contact, self._kind
-        for i, pair in enumerate(contact.geom.tolist()):
+        for pair in contact.geom.tolist():
             if kind[pair[0]] + kind[pair[1]] != 1:
                 continue
             own, other = pair if kind[pair[0]] else pair[::-1]
             model = self._robot.scene.model
             touch = " on ".join(model.body(model.geom_bodyid[g]).name for g in (own, other))
-            if touch not in self.touched:
-                self.touched[touch] = t
-                x, y, z = contact.pos[i].tolist()
-                self.places[touch] = (x, y, z)
+            self.touched.setdefault(touch, t)
+
+
+def errors(name: str, off: PlanarPose) -> dict[str, float]:
+    """Return x, y, their length [m] and the heading [rad] of `off`, as figures whose names begin with `name`."""
+    return {f"{name}_x": off.x, f"{name}_y": off.y, f"{name}_radial": apart(off), f"{name}_yaw": off.yaw}
+
+
+def apart(off: PlanarPose) -> float:
+    """Return how far apart two poses are [m] of which `off` is one in the frame of the other."""
+    return math.hypot(off.x, off.y)
 
 
 def place_error(bus: Bus, robot: MujocoRobot) -> float:
@@ -69,8 +74,7 @@ def place_error(bus: Bus, robot: MujocoRobot) -> float:
     believed, place = bus.latest(topics.ODOMETRY), bus.latest(topics.MAP_POSE)
     if believed is None or place is None:
         return 0.0
-    off = robot.truth.pose().to(place.T_odom_map.to(PlanarPose.of(believed.T_odom_base)))
-    return math.hypot(off.x, off.y)
+    return apart(robot.truth.pose().to(place.T_odom_map.to(PlanarPose.of(believed.T_odom_base))))
 
 
 Where = Literal["seated", "lifted", "tray", "floor"]

@@ -1,11 +1,11 @@
-"""Rung `navigate`: 6 m through a hall with walls and obstacles, by the robot's own map; one navigator per method."""
+"""Rungs `navigate` and `navigate-line`: 6 m through a hall by the robot's own map, or straight over the open floor."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Literal
@@ -17,13 +17,18 @@ from golem.capabilities.navigation.movers import BODY
 from golem.dashboard.map_picture import GOAL, TRACK, WAY, MapPicture
 from golem.evaluation.base import DONE, Rung, TrialOutcome, TrialSpec
 from golem.evaluation.episodes.episode import Episode, Loss, episode_seed, legs_stack
-from golem.evaluation.episodes.oracle import ContactWatch
+from golem.evaluation.episodes.last_seconds import FilmStrip
+from golem.evaluation.episodes.oracle import ContactWatch, apart, errors
 from golem.evaluation.episodes.survey import survey
+from golem.evaluation.rungs.leg_rung import NO_WALKER, LegRung, PlantOptions
 from golem.interfaces import topics
 from golem.interfaces.nav_payloads import NavStep
 from golem.provenance import stack_facts
+from golem.robots.mujoco.balance import TRACE
+from golem.runtime.executor import when_stepped
 from golem.runtime.lockstep import build_robot
 from golem.skills.navigate import NavigateGoal
+from golem.skills.walk import WalkGoal
 from golem.stack import Stack
 from golem.types import Array, PlanarPose, Twist, wrap
 
@@ -96,7 +101,7 @@ MapKind = Literal["survey", "none"]
 SLOT = "navigator"
 """What the methods of this rung are."""
 DISTANCE = 6.0
-"""Length of the way as the crow flies [m], from the paper."""
+"""Length of the way as the crow flies, and of the line [m], from the paper."""
 SPREAD = (0.2, 0.4, math.radians(20.0))
 """Bounds of where the robot starts, x, y [m] and heading [rad]; the goal is drawn off by it."""
 GUESS = (0.4, 0.4, math.radians(15.0))
@@ -193,31 +198,22 @@ def judge(
     bus, result, loss = episode.running.bus, episode.result, episode.loss
     true = episode.robot.truth.pose()
     left = goal.to(true)
-    radial, turned = math.hypot(left.x, left.y), abs(wrap(left.yaw))
+    radial, turned = apart(left), abs(wrap(left.yaw))
     track = np.array(walked.track or [(0.0, 0.0)])
     gone = float(np.linalg.norm(np.diff(track[::5], axis=0), axis=1).sum())
-    series = {
-        "goal_x": left.x,
-        "goal_y": left.y,
-        "goal_radial": radial,
-        "goal_yaw": turned,
-        "distance": gone,
-        "contacts": float(len(contacts.touched)),
-        **walked.series(),
-    }
+    series = errors("goal", left) | {"goal_yaw": turned, "distance": gone, "contacts": float(len(contacts.touched))}
+    series |= walked.series()
     drift, believed = 0.0, bus.latest(topics.ODOMETRY)
     if believed is not None:
         there = PlanarPose.of(believed.T_odom_base)
-        series["odometry_error"] = math.hypot(*_off(true, there))
+        series["odometry_error"] = apart(true.to(there))
         place = bus.latest(topics.MAP_POSE)
         there = there if place is None else place.T_odom_map.to(there)
-        drift = series["place_error"] = math.hypot(*_off(true, there))
+        drift = series["place_error"] = apart(true.to(there))
         series["place_yaw"] = abs(true.to(there).yaw)
-        rest = there.to(goal)
-        series["follower_error"] = math.hypot(rest.x, rest.y)
+        series["follower_error"] = apart(there.to(goal))
     if walked.stopped is not None:
-        shift = walked.stopped.to(true)
-        series["stop_shift"] = math.hypot(shift.x, shift.y)
+        series["stop_shift"] = apart(walked.stopped.to(true))
     modules = {key: f"{key}: {episode.running.stack.choice(key).use}" for key in ("lower_body", "odometry", "mapper")}
     # With a map the mapper answers for the place, which corrects the odometry by it.
     lost = modules["mapper" if spec.case["map"] == "survey" else "odometry"]
@@ -243,11 +239,6 @@ def judge(
     return TrialOutcome(True, DONE, None, detail, result.timings if result else {}, series, picture)
 
 
-def _off(one: PlanarPose, other: PlanarPose) -> tuple[float, float]:
-    off = one.to(other)
-    return off.x, off.y
-
-
 def _picture(episode: Episode, track: Array, goal: PlanarPose) -> bytes | None:
     """Return the map with the way and the walk as PNG; None where there is no map."""
     bus = episode.running.bus
@@ -260,3 +251,77 @@ def _picture(episode: Episode, track: Array, goal: PlanarPose) -> bytes | None:
     picture.line(track, TRACK)
     picture.pose(goal, GOAL)
     return cv2.imencode(".png", picture.rgb()[..., ::-1])[1].tobytes()
+
+
+LINE_TOLERANCE = 0.5
+"""True radial error up to which the goal of the line counts as reached [m]; the paper's failed run was several metres
+off."""
+LINE_SETTLE, LINE_TIMEOUT = 2.0, 60.0
+"""Time before the robot sets out on the line, and time it gets to arrive [s]."""
+PICTURES = 5
+"""Moments of the strip of pictures."""
+
+
+@dataclass(frozen=True)
+class LineOptions(PlantOptions):
+    """The twin under the lower bodies."""
+
+    latency: float = 0.0
+    """Delay of motor commands on top of the profile's [s]."""
+
+
+class NavigateLine(LegRung[LineOptions]):
+    """Walk 6 m straight ahead over the open floor, by odometry; the error is that of the true pose.
+
+    No LiDAR odometry takes part: the robot goes by its base estimator, to whose pose a noise of 1 cm and 1 deg is
+    added (`golem.evaluation.episodes.episode`). The drift of legs and IMU over the line is in the error.
+    """
+
+    name = "navigate-line"
+    Options = LineOptions
+    facts = {"distance": DISTANCE, "tolerance": LINE_TOLERANCE}
+
+    def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
+        with closing(self.episode(spec)) as episode:
+            if episode.running.envelope.vx[1] <= 0.0:
+                why = "It does not walk: the greatest forward speed in its envelope is zero."
+                return TrialOutcome(False, NO_WALKER, f"lower_body: {spec.method}", why)
+            episode.locate(spec.rng("odometry"))
+            strip = FilmStrip(episode.robot, 0.0)
+            episode.stand(LINE_SETTLE)
+            if not episode.over:
+                goal = WalkGoal(DISTANCE, 0.0, 0.0, "odom", LINE_TIMEOUT)
+                episode.start("walk", goal)
+            for _ in range(PICTURES - 1):
+                strip.keep(episode.t, np.zeros(3))
+                episode.run(DISTANCE / PICTURES / 0.4, until=lambda: episode.result is not None, due=when_stepped)
+            episode.run(LINE_TIMEOUT, until=lambda: episode.result is not None, due=when_stepped)
+            strip.keep(episode.t, np.zeros(3))
+            if artefacts is not None:
+                episode.recorder.trace().save(artefacts / TRACE)
+            outcome = judge_line(episode, spec.method)
+            shown = not outcome.success or spec.index == 0
+            return replace(outcome, picture=strip.picture() if shown else None)
+
+
+def judge_line(episode: Episode, method: str) -> TrialOutcome:
+    """Say where the robot ended."""
+    trace, true = episode.recorder.trace(), episode.robot.truth.pose()
+    left = PlanarPose(DISTANCE, 0.0, 0.0).to(true)
+    series = errors("goal", left) | {"steps": float(trace.steps), "margin_min": float(trace.margin.min())}
+    believed = episode.running.bus.latest(topics.ODOMETRY)
+    if believed is not None:
+        series["odometry_error"] = apart(true.to(PlanarPose.of(believed.T_odom_base)))
+    loss, result = episode.loss, episode.result
+    slot, module = "lower_body", f"lower_body: {method}"
+    if loss is None and result is not None and not result.success:
+        loss = Loss(result.stage, result.reason, result.trace)
+        slot = "navigator" if result.slot == "navigator" else slot
+    if loss is None and apart(left) > LINE_TOLERANCE:
+        loss = Loss("goal", f"It stands {apart(left):.2f} m beside the goal and believes to be there.")
+        slot = "estimator"
+    if loss is not None:
+        module = module if slot == "lower_body" else f"{slot}: {episode.running.stack.choice(slot).use}"
+        return TrialOutcome(False, loss.stage, module, loss.detail, series=series, trace=loss.trace)
+    detail = f"stands {1e3 * apart(left):.0f} mm from the goal"
+    return TrialOutcome(True, DONE, None, detail, result.timings if result else {}, series)

@@ -15,10 +15,10 @@ import numpy as np
 from golem.capabilities.arms.reach_map import load_map
 from golem.capabilities.navigation.goto import GoTo
 from golem.errors import ConfigError
-from golem.evaluation.base import Case, Outcomes, Results, TrialOutcome, TrialSpec
+from golem.evaluation.base import Case, Outcomes, Results, Rung, TrialOutcome, TrialSpec
 from golem.evaluation.blame.oracles import with_modules
 from golem.evaluation.episodes.episode import Episode, Loss, episode_seed, lost
-from golem.evaluation.episodes.oracle import ContactWatch, Oracle, place_error
+from golem.evaluation.episodes.oracle import ContactWatch, Oracle, errors, place_error
 from golem.evaluation.episodes.pick_claims import claims
 from golem.evaluation.episodes.pick_watch import PickTouches, PickWatch
 from golem.evaluation.rungs.navigate_hall import DISTANCE, SPREAD, surveyed
@@ -88,14 +88,10 @@ class VarStandRung(PickRung):
     Options = VarStandOptions
     options: VarStandOptions
     default_methods = ("visual_servo",)
+    varied = {"start": "start", "dock": "dock"}
 
     def cases(self, results: Results) -> Sequence[Case]:
-        return [
-            {**condition, "start": start, "dock": dock}
-            for condition in super().cases(results)
-            for start in self.options.start
-            for dock in self.options.dock
-        ]
+        return [{**condition, **own} for condition in super().cases(results) for own in Rung.cases(self, results)]
 
     @property
     def balances(self) -> bool:
@@ -245,13 +241,7 @@ class _Trial:
         return self._name("mapper" if drift > 0.5 * off else "navigator")
 
     def _placed(self, when: str) -> dict[str, float]:
-        off = self._stance.to(self._episode.robot.truth.pose())
-        return {
-            f"{when}_x": off.x,
-            f"{when}_y": off.y,
-            f"{when}_radial": math.hypot(off.x, off.y),
-            f"{when}_yaw": off.yaw,
-        }
+        return errors(when, self._stance.to(self._episode.robot.truth.pose()))
 
     def _failed(self, loss: Loss, slot: str) -> TrialOutcome:
         series = {**self._series, "contacts": float(len(self._contacts.touched))}
@@ -266,7 +256,7 @@ class _Trial:
 
 def _conditions(case: Case) -> Case:
     """Return what of a case the place is drawn from."""
-    return {k: v for k, v in case.items() if k not in ("start", "dock")}
+    return {k: v for k, v in case.items() if k not in VarStandRung.varied}
 
 
 def drawn_stance(spec: TrialSpec, walks: bool) -> PlanarPose:

@@ -14,6 +14,7 @@ from golem.capabilities.legs.base import Envelope
 from golem.errors import unknown_name
 from golem.evaluation.base import TrialOutcome, TrialSpec
 from golem.evaluation.episodes.episode import Episode, Loss
+from golem.evaluation.episodes.oracle import errors
 from golem.evaluation.episodes.scripted_motion import ArmMotion, ScriptedMotion
 from golem.evaluation.rungs.leg_rung import LegRung, PlantOptions, can_walk, judged, no_walker
 from golem.provenance import stack_facts
@@ -179,9 +180,7 @@ class WalkStop(LegRung[PlantOptions]):
         result, loss = episode.result, episode.loss
         if loss is not None or result is None:
             return judged(spec.method, loss or Loss("walk", "The skill did not end."), {})
-        left = goal.to(episode.robot.truth.pose())
-        radial = math.hypot(left.x, left.y)
-        series = {"goal_x": left.x, "goal_y": left.y, "goal_radial": radial, "goal_yaw": left.yaw}
+        series = errors("goal", goal.to(episode.robot.truth.pose()))
         loss = None if result.success else Loss(result.stage, result.reason, result.trace)
         return judged(spec.method, loss, series, result.timings)
 
