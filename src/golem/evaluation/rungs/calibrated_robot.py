@@ -126,11 +126,9 @@ ERRORS = ("before", "after", "sigma", "joint_before", "joint_after", "views", "r
 
 
 @dataclass(frozen=True)
-class CalibrationOptions:
-    """What is calibrated, and how."""
+class HowCalibrated:
+    """How a robot is calibrated."""
 
-    what: tuple[Literal["head", "hand", "lidar"], ...] = ("head",)
-    """head; or hand, the palm cameras, or lidar, of a robot whose head was calibrated."""
     views: int = VIEWS
     """Postures of each hand."""
     keep: str = ""
@@ -138,13 +136,16 @@ class CalibrationOptions:
 
 
 @dataclass(frozen=True)
-class CalibratedPickOptions(PickOptions):
-    """The work place, and how the robot was calibrated."""
+class CalibrationOptions(HowCalibrated):
+    """What is calibrated, and how."""
 
-    views: int = VIEWS
-    """Postures of each hand."""
-    keep: str = ""
-    """Folder in which calibrations are kept, by profile and episode, and from which they are taken where they are."""
+    what: tuple[Literal["head", "hand", "lidar"], ...] = ("head",)
+    """head; or hand, the palm cameras, or lidar, of a robot whose head was calibrated."""
+
+
+@dataclass(frozen=True)
+class CalibratedPickOptions(HowCalibrated, PickOptions):
+    """The work place, and how the robot was calibrated."""
 
 
 class CalibrationRung(Rung[CalibrationOptions]):
@@ -193,15 +194,12 @@ class CalibratedTether(PickRung):
     name = "tether-calibrated"
     stack_name = STACK
     Options = CalibratedPickOptions
-
-    def __init__(self, options: CalibratedPickOptions | None = None) -> None:
-        super().__init__(options)
-        self._how = options or CalibratedPickOptions()
-        self._file: Path | None = None
+    options: CalibratedPickOptions
+    _file: Path | None = None
 
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
         seed = episode_seed(spec.seed, spec.index)
-        found = calibrate(tagged_stack(spec.profile, {}), seed, self._how.views, self._how.keep)
+        found = calibrate(tagged_stack(spec.profile, {}), seed, self.options.views, self.options.keep)
         if isinstance(found, SkillResult):
             return _failed(found)
         with tempfile.TemporaryDirectory() as folder:

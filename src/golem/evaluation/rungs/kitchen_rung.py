@@ -37,7 +37,8 @@ class KitchenOptions:
     """The kitchen."""
 
     layout: LayoutKind = "varied"
-    """nominal: the counter always has one height and one colour. varied: drawn from the trial's seed."""
+    """nominal: the counter always has one height and one colour, and the fridge one place, from which it opens to the
+    right. varied: places, sizes, colours and the side of the hinge are drawn from the trial's seed."""
     calibrated: str = ""
     """Folder of calibrations; see the rung `pack`."""
 
@@ -79,6 +80,7 @@ class KitchenRung(Rung[O]):
         balances: whether the robot stands on its own feet.
     """
 
+    Options = KitchenOptions
     slot: ClassVar[str] = SLOT
     subject: ClassVar[str] = "kitchen"
     stack_name: ClassVar[str] = ""

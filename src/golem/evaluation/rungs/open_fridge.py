@@ -6,7 +6,7 @@ Both run the same trials: trial `i` of one seed has the same kitchen, calibratio
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,6 @@ from golem.evaluation.episodes.oracle import Oracle
 from golem.evaluation.rungs.kitchen_rung import Errand, KitchenOptions, KitchenRung, Verdict
 from golem.robots.mujoco.balance import BalanceRecorder
 from golem.robots.mujoco.engine import MujocoRobot
-from golem.robots.worlds.conditions import LayoutKind
 from golem.robots.worlds.kitchen import KitchenLayout
 from golem.runtime.lockstep import LockstepRunner
 from golem.skills.open_door import OpenGoal, OpenReport
@@ -27,19 +26,9 @@ OPENED = 0.30
 """Angle from which on a door is open [rad]: 17 deg, 16 cm at the handle; the skill is asked for 23 deg."""
 
 
-@dataclass(frozen=True)
-class FridgeOptions(KitchenOptions):
-    """The kitchen."""
-
-    layout: LayoutKind = "varied"
-    """nominal: the fridge always stands at the same place and opens to the right. varied: places, sizes, colours and
-    the side of the hinge are drawn from the trial's seed."""
-
-
-class FridgeRung(KitchenRung[FridgeOptions]):
+class FridgeRung(KitchenRung[KitchenOptions]):
     """One fridge per trial: its handle is seen, grasped, and pulled along its circle."""
 
-    Options = FridgeOptions
     default_methods = ("centroid", "antipodal", "reranked")
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
