@@ -85,8 +85,7 @@ def record(episode: Episode, spec: TrialSpec, pushed: bool) -> RecordedWalk:
     """Let a robot walk, arms moving, record and close it; `pushed` is with one shove per segment, from all sides."""
     truth = episode.robot.truth
     T_odom_world = np.linalg.inv(truth.T_world_odom)
-    states: list[LowState] = []
-    poses, velocities, forces, stepping, free = [], [], [], [], []
+    states, rows = list[LowState](), list[tuple[Array, Array, Array, bool, bool]]()
 
     def look() -> tuple[Array, Array, Array]:
         base = truth.base()
@@ -103,10 +102,7 @@ def record(episode: Episode, spec: TrialSpec, pushed: bool) -> RecordedWalk:
         if state is None or (states and state.t == states[-1].t):
             return False  # asked before the first tick of a stretch
         states.append(state)
-        for column, value in zip((poses, velocities, forces), now, strict=True):
-            column.append(value)
-        stepping.append(legs is not None and (legs.stepping or legs.moving))
-        free.append(not episode.robot.on_gantry)
+        rows.append((*now, legs is not None and (legs.stepping or legs.moving), not episode.robot.on_gantry))
         now = look()
         return False
 
@@ -119,18 +115,11 @@ def record(episode: Episode, spec: TrialSpec, pushed: bool) -> RecordedWalk:
                 episode.push(shove(DIRECTIONS[(i + spec.index) % len(DIRECTIONS)], SHOVE))
             episode.run(SEGMENT - 0.5, sample)
         loss = episode.loss
+    T, velocity, forces, stepping, free = (np.array([row[i] for row in rows]) for i in range(5))
     judged = np.cumsum(free) * TICK > 1.0
     if loss is not None:
         judged[-round(1.0 / TICK) :] = False
-    return RecordedWalk(
-        states=states,
-        T=np.array(poses),
-        velocity=np.array(velocities),
-        forces=np.array(forces),
-        judged=judged,
-        stepping=np.array(stepping),
-        lost="" if loss is None else loss.detail,
-    )
+    return RecordedWalk(states, T, velocity, forces, judged, stepping, "" if loss is None else loss.detail)
 
 
 Spoil = Callable[[RecordedWalk, np.random.Generator], list[LowState]]

@@ -90,31 +90,27 @@ def verdict(said: PickReport, success: bool, doable: bool) -> dict[str, float]:
 
 def verdict_tables(outcomes: Mapping[str, Sequence[TrialOutcome]]) -> list[TextTable]:
     """Return one table per method: what was said, how often, and whether it was so."""
-    return [_table(method, rows) for method, rows in outcomes.items() if rows]
+    tables: list[TextTable] = []
+    for method, rows in outcomes.items():
+        lines: list[tuple[str, ...]] = []
+        for outcome in PickOutcome:
+            mine = [row for row in rows if f"{SAID}{outcome.value}" in row.series]
+            could, in_tray = sum(bool(row.series["doable"]) for row in mine), sum(row.success for row in mine)
+            right = len(mine) - could if outcome in REFUSALS else in_tray
+            if mine:
+                counts = len(mine), could, in_tray, right, len(mine) - right
+                lines.append((outcome.value, *map(str, counts)))
+        if rows:
+            heads = ("said", "trials", "could be done", "in the tray", "right", "wrong")
+            tables.append(TextTable(f"What {method} said at the end", heads, tuple(lines), VERDICTS))
+    return tables
 
 
-def _table(method: str, rows: Sequence[TrialOutcome]) -> TextTable:
-    lines: list[tuple[str, ...]] = []
-    for outcome in PickOutcome:
-        mine = [row for row in rows if f"{SAID}{outcome.value}" in row.series]
-        if not mine:
-            continue
-        could = [row for row in mine if row.series["doable"]]
-        refusal = outcome in REFUSALS
-        in_tray = sum(row.success for row in mine)
-        right = len(mine) - len(could) if refusal else in_tray
-        wrong = str(len(mine) - right)
-        counts = (str(len(mine)), str(len(could)), str(in_tray))
-        lines.append((outcome.value, *counts, str(right), wrong))
-    return TextTable(
-        f"What {method} said at the end",
-        ("said", "trials", "could be done", "in the tray", "right", "wrong"),
-        tuple(lines),
-        "Could be done: by the simulator's truth, a hand reaches a loose screw and the tray. A refusal is right where "
-        "it could not; anything else where a screw is in the tray.",
-    )
-
-
+VERDICTS = (
+    "Could be done: by the simulator's truth, a hand reaches a loose screw and the tray. A refusal is right where it "
+    "could not; anything else where a screw is in the tray."
+)
+"""The note of what was said at the end."""
 HEADING = np.pi / 2
 """Heading of the gripper's x axis, left hand; mirrored for the right [rad]."""
 NEAREST = 10

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from golem import registry
-from golem.capabilities.memory.base import Memory, Place, When
+from golem.capabilities.memory.base import Memory, Observation, Place, When
 from golem.evaluation.base import DONE, Outcomes, Rung, TrialOutcome, TrialSpec
 from golem.evaluation.episodes.relocation import Rates, Relocation, Setting, Thing, relocation
 from golem.evaluation.metrics.statistics import mean_interval
@@ -241,21 +241,16 @@ def _make(method: str) -> Memory:
 
 def ask(method: str, episode: Relocation) -> TrialOutcome:
     """Show an episode to a new memory, with questions after either walk, and judge the answers."""
-    contract = ContractCheck(SLOT, method)
-    memory = _make(method)
-    looks, times = episode.observations, _Times()
-    for look in looks[: episode.split]:
-        times.updates.append(_timed(lambda look=look: contract.call(memory.observe, look))[1])
-    static = [times.ask(memory, contract, thing.kind) for thing in _kinds(episode.before)]
-    for look in looks[episode.split :]:
-        times.updates.append(_timed(lambda look=look: contract.call(memory.observe, look))[1])
-    now = times.ask(memory, contract, episode.target)
-    bystander = times.ask(memory, contract, episode.before[1].kind)
-    past = times.ask(memory, contract, episode.target, "history", limit=3)
-    if not past:
-        past = times.ask(memory, contract, episode.target, "anywhere", limit=3)
-    absent = [times.ask(memory, contract, kind) for kind in episode.absent]
-    memory.close()
+    memory = _Watched(method)
+    for look in episode.observations[: episode.split]:
+        memory.observe(look)
+    static = [memory.query(thing.kind) for thing in _kinds(episode.before)]
+    for look in episode.observations[episode.split :]:
+        memory.observe(look)
+    now, bystander = memory.query(episode.target), memory.query(episode.before[1].kind)
+    past = memory.query(episode.target, "history", 3) or memory.query(episode.target, "anywhere", 3)
+    absent = [memory.query(kind) for kind in episode.absent]
+    memory.memory.close()
     kinds = _kinds(episode.before)
     ranks = [_rank(answer, thing.kind, episode.before) for answer, thing in zip(static, kinds, strict=True)]
     twin = [thing for thing in episode.after[1:] if thing.kind == episode.target]
@@ -272,32 +267,30 @@ def ask(method: str, episode: Relocation) -> TrialOutcome:
         "absent": float(np.mean([not answer for answer in absent])),
     }
     wrong = [name for name, value in series.items() if value != (0.0 if name == "outdated_top1" else 1.0)]
+    costs = {"query": float(np.median(memory.queries)), "update": float(np.median(memory.updates))}
     if not wrong:
-        return TrialOutcome(True, DONE, detail="every answer is right", series=series, costs=times.costs())
+        return TrialOutcome(True, DONE, detail="every answer is right", series=series, costs=costs)
     detail = f"The {episode.target} was moved; wrong: {', '.join(wrong)}."
-    return TrialOutcome(False, wrong[0], f"{SLOT}: {method}", detail, series=series, costs=times.costs())
+    return TrialOutcome(False, wrong[0], f"{SLOT}: {method}", detail, series=series, costs=costs)
 
 
-class _Times:
-    def __init__(self) -> None:
-        self.updates: list[float] = []
-        self.queries: list[float] = []
+class _Watched:
+    """A new memory whose contract is watched, and the CPU time [s] of each look and each query."""
 
-    def ask(
-        self, memory: Memory, contract: ContractCheck, text: str, when: When = "now", limit: int = 5
-    ) -> list[Place]:
-        answer, cpu = _timed(lambda: list(contract.call(memory.query, text, when, None, limit)))
-        self.queries.append(cpu)
+    def __init__(self, method: str) -> None:
+        self.memory, self._contract = _make(method), ContractCheck(SLOT, method)
+        self.updates, self.queries = list[float](), list[float]()
+
+    def observe(self, look: Observation) -> None:
+        start = time.thread_time()
+        self._contract.call(self.memory.observe, look)
+        self.updates.append(time.thread_time() - start)
+
+    def query(self, text: str, when: When = "now", limit: int = 5) -> list[Place]:
+        start = time.thread_time()
+        answer = list(self._contract.call(self.memory.query, text, when, None, limit))
+        self.queries.append(time.thread_time() - start)
         return answer
-
-    def costs(self) -> dict[str, float]:
-        return {"query": float(np.median(self.queries)), "update": float(np.median(self.updates))}
-
-
-def _timed(work: Callable[[], Any]) -> tuple[Any, float]:
-    start = time.thread_time_ns()
-    answer = work()
-    return answer, (time.thread_time_ns() - start) * 1e-9
 
 
 def _kinds(things: Sequence[Thing]) -> list[Thing]:
