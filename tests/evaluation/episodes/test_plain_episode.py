@@ -38,6 +38,6 @@ def test_a_policy_from_outside_gets_the_twist_as_it_is() -> None:
 def test_its_upper_body_keeps_the_posture_of_its_description() -> None:
     episode = PlainEpisode("policy:almi_stand", None, np.random.default_rng(0))
     episode.run(1.0)
-    q = episode.state().q
+    q = episode._robot.state().q
     assert abs(q[13:]).max() < 0.1 and abs(q[12]) < 0.05
     assert not episode.over

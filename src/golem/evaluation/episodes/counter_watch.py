@@ -91,49 +91,44 @@ class CounterWatch(ErrandWatch):
 
     def problem(self, place: tuple[float, float]) -> str | None:
         """Return what is not as asked for at `place`, x, y in the world [m], in a sentence; None where all is."""
-        now = self._things()
-        lifted = self._lifted()
-        if not lifted:
+        now, lifted = self._things(), self._lifted()
+        if lifted is None:
             return f"No {self._kind} was lifted."
-        one = now[lifted[0]]
+        one = now[lifted]
         off = float(np.hypot(*(one.position[:2] - place)))
         if one.lean > UPRIGHT:
             return f"The {self._kind} leans by {np.rad2deg(one.lean):.0f} deg."
-        if off > THERE or abs(one.position[2] - self._before[lifted[0]].position[2]) > LEVEL:
+        if off > THERE or abs(one.position[2] - self._before[lifted].position[2]) > LEVEL:
             return f"The {self._kind} is {1e2 * off:.0f} cm from its place."
         for k, (before, after) in enumerate(zip(self._before, now, strict=True)):
             moved = float(np.linalg.norm(after.position - before.position))
-            if k != lifted[0] and (moved > MOVED or after.lean > UPRIGHT):
+            if k != lifted and (moved > MOVED or after.lean > UPRIGHT):
                 return f"The {after.kind} beside it was moved by {1e2 * moved:.0f} cm or knocked over."
         return None
 
     def astray(self, place: tuple[float, float]) -> bool:
         """Return whether one of the kind was lifted and stands upright at its height, but not at `place`."""
         now, lifted = self._things(), self._lifted()
-        if not lifted or now[lifted[0]].lean > UPRIGHT:
+        if lifted is None or now[lifted].lean > UPRIGHT:
             return False
-        moved = now[lifted[0]].position - self._before[lifted[0]].position
-        off = float(np.hypot(*(now[lifted[0]].position[:2] - place)))
+        moved = now[lifted].position - self._before[lifted].position
+        off = float(np.hypot(*(now[lifted].position[:2] - place)))
         return off > THERE and abs(float(moved[2])) <= LEVEL
 
     def series(self, place: tuple[float, float]) -> dict[str, float]:
         """Return how far from its place the thing stands, where it was lifted, and how far others were moved [m]."""
-        now = self._things()
-        lifted = self._lifted()
-        moved = [
-            float(np.linalg.norm(b.position - a.position))
-            for k, (a, b) in enumerate(zip(self._before, now, strict=True))
-            if k not in lifted[:1]
-        ]
-        series = {"others_moved": max(moved, default=0.0), "was_lifted": float(bool(lifted))}
-        if lifted:
-            series["set_down_error"] = float(np.hypot(*(now[lifted[0]].position[:2] - place)))
+        now, lifted = self._things(), self._lifted()
+        others = [pair for k, pair in enumerate(zip(self._before, now, strict=True)) if k != lifted]
+        moved = [float(np.linalg.norm(b.position - a.position)) for a, b in others]
+        series = {"others_moved": max(moved, default=0.0), "was_lifted": float(lifted is not None)}
+        if lifted is not None:
+            series["set_down_error"] = float(np.hypot(*(now[lifted].position[:2] - place)))
         return series
 
-    def _lifted(self) -> list[int]:
-        return [
-            k for k, t in enumerate(self._before) if t.kind == self._kind and self._highest[k] > t.position[2] + LIFTED
-        ]
+    def _lifted(self) -> int | None:
+        """Return which thing of the kind was lifted, the first; None where none was."""
+        mine = (k for k, thing in enumerate(self._before) if thing.kind == self._kind)
+        return next((k for k in mine if self._highest[k] > self._before[k].position[2] + LIFTED), None)
 
     def _things(self) -> list[StandingOne]:
         found: list[StandingOne] = []

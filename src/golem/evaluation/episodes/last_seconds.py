@@ -5,7 +5,8 @@ from __future__ import annotations
 import io
 import textwrap
 from collections import deque
-from dataclasses import dataclass
+from contextlib import closing
+from dataclasses import dataclass, replace
 from typing import Any
 
 import mujoco
@@ -50,26 +51,30 @@ class FilmStrip:
         """Return the strip as PNG, None where nothing was kept; leaves the twin in the last moment's posture."""
         if not self._kept:
             return None
-        data, model = self._robot.data, self._robot.scene.model
-        start = self._kept[0][0]
-        frames: list[Image.Image] = []
-        view: SpectatorView | None = None
-        shot = SHOT
-        for t, qpos, force in self._kept:
-            data.qpos[:] = qpos
-            mujoco.mj_kinematics(model, data)
-            mujoco.mj_camlight(model, data)
-            pelvis = data.body(BASE_LINK).xpos.copy()
-            if view is None:
-                # MuJoCo's azimuth is where the camera looks to.
-                azimuth = float(np.degrees(self._bearing)) + 90.0
-                shot = Shot((pelvis[0], pelvis[1], MIDDLE), azimuth, SHOT.elevation, SHOT.distance, SHOT.fovy)
-                view = SpectatorView(self._robot, {"strip": shot}, (2 * SIZE[0], 2 * SIZE[1]))
-            frame = Image.fromarray(view.picture("strip")).resize(SIZE, Image.Resampling.LANCZOS)
-            frames.append(_annotate(frame, shot, t - start, pelvis, force))
-        if view is not None:
-            view.close()
-        return _joined(frames)
+        (start, first, _), frames = self._kept[0], list[Image.Image]()
+        x, y, _ = self._posed(first)
+        # MuJoCo's azimuth is where the camera looks to.
+        shot = replace(SHOT, look_at=(x, y, MIDDLE), azimuth=float(np.degrees(self._bearing)) + 90.0)
+        with closing(SpectatorView(self._robot, {"strip": shot}, (2 * SIZE[0], 2 * SIZE[1]))) as view:
+            for t, qpos, force in self._kept:
+                pelvis = self._posed(qpos)
+                frame = Image.fromarray(view.picture("strip")).resize(SIZE, Image.Resampling.LANCZOS)
+                frames.append(_annotate(frame, shot, t - start, pelvis, force))
+        (width, height), gap = SIZE, 3
+        strip = Image.new("RGB", (len(frames) * (width + gap) - gap, height), (255, 255, 255))
+        for i, frame in enumerate(frames):
+            strip.paste(frame, (i * (width + gap), 0))
+        stream = io.BytesIO()
+        strip.save(stream, "PNG", optimize=True)
+        return stream.getvalue()
+
+    def _posed(self, qpos: Array) -> Array:
+        """Put the twin into a posture, and return where its pelvis is then, (3,) in the world [m]."""
+        data = self._robot.data
+        data.qpos[:] = qpos
+        mujoco.mj_kinematics(self._robot.scene.model, data)
+        mujoco.mj_camlight(self._robot.scene.model, data)
+        return data.body(BASE_LINK).xpos.copy()
 
 
 def project(shot: Shot, size: tuple[int, int], point: Array) -> tuple[float, float]:
@@ -98,17 +103,6 @@ def _annotate(frame: Image.Image, shot: Shot, t: float, pelvis: Array, force: Ar
         draw.line([*tail, *(head - 6 * along)], fill=ACCENT, width=4)
         draw.polygon([*head, *(head - 14 * along + 7 * across), *(head - 14 * along - 7 * across)], fill=ACCENT)
     return frame
-
-
-def _joined(frames: list[Image.Image]) -> bytes:
-    gap = 3
-    width, height = SIZE
-    strip = Image.new("RGB", (len(frames) * (width + gap) - gap, height), (255, 255, 255))
-    for i, frame in enumerate(frames):
-        strip.paste(frame, (i * (width + gap), 0))
-    stream = io.BytesIO()
-    strip.save(stream, "PNG", optimize=True)
-    return stream.getvalue()
 
 
 FILM = "film.webp"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import dataclass
 from typing import Literal
@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from golem.capabilities.odometry.base import OdometryEstimate
-from golem.errors import ConfigError
-from golem.evaluation.base import Onlooker
+from golem.evaluation.base import Onlooker, TrialSpec
 from golem.evaluation.episodes.episode import Episode, episode_seed, legs_stack
 from golem.evaluation.episodes.scripted_motion import ArmMotion, ScriptedMotion
 from golem.interfaces import topics
@@ -123,31 +122,18 @@ class Pilot:
         return Twist(SPEED, 0.0, float(np.clip(1.5 * bearing, -0.4, 0.4)))
 
 
-def record_walk(
-    route: Route,
-    index: int,
-    *,
-    seed: int = 0,
-    profile: str = "field",
-    legs: str = "almi",
-    people: int = 0,
-    overrides: Mapping[str, str] | None = None,
-    onlooker: Onlooker | None = None,
-) -> LidarWalk:
-    """Let the robot walk a route, its arms moving. Raises ConfigError: a name is wrong.
+def record_walk(spec: TrialSpec, route: Route, people: int, legs: str, onlooker: Onlooker | None = None) -> LidarWalk:
+    """Let the robot of a trial walk a route, its arms moving. Raises ConfigError: a name is wrong.
 
     Args:
-        seed: seed of all walks.
-        legs: lower body.
+        spec: the estimator is `ESTIMATOR` where its overrides name none.
         people: how many walk around it.
-        overrides: stack slot -> implementation; the estimator is `ESTIMATOR` where it names none.
+        legs: lower body.
         onlooker: is shown the stack.
     """
-    if route not in ROUTES:
-        raise ConfigError(f"There is no route '{route}'; choose from {', '.join(ROUTES)}.")
-    own = episode_seed(seed, index)
+    own = episode_seed(spec.seed, spec.index)
     plant = {"world": WORLDS[route], "people": people}
-    stack = legs_stack(legs, profile, {"estimator": ESTIMATOR, **(overrides or {})}, plant)
+    stack = legs_stack(legs, spec.profile, {"estimator": ESTIMATOR, **spec.overrides}, plant)
     episode = Episode(stack, own, onlooker)
     truth, data = episode.robot.truth, episode.robot.data
     T_odom_world = np.linalg.inv(truth.T_world_odom)
@@ -184,7 +170,7 @@ def record_walk(
     t, qpos, qvel, T = (np.array([row[i] for row in rows]) for i in (0, 1, 2, 4))
     commands = [row[3] for row in rows]
     lost = loss.detail if loss is not None else "" if pilot.done else "It did not get to the end of its route."
-    return LidarWalk(own, profile, episode.robot.scene, t, qpos, qvel, commands, T, lost)
+    return LidarWalk(own, spec.profile, episode.robot.scene, t, qpos, qvel, commands, T, lost)
 
 
 ANCHOR = 1.0

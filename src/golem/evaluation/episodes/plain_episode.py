@@ -169,10 +169,6 @@ class PlainEpisode:
         """The twists that the lower body can follow."""
         return self._legs.controller.envelope
 
-    def state(self) -> LowState:
-        """Return the true state of the joints."""
-        return self._robot.state()
-
     def run(self, seconds: float, until: Callable[[], bool] = lambda: False) -> None:
         end = self.t + seconds - TICK / 2
         while not self.over and self.t < end:

@@ -215,8 +215,10 @@ def _read(file: Path, folder: Path) -> list[LabelledImage]:
         raise ConfigError(f"{file} is not in COCO format: it is no JSON object.") from error
     if absent:
         raise ConfigError(f"{file} is not in COCO format: it has no list `{absent[0]}`.")
-    names = {_id(c): label_of(str(_get(file, c, "category", "name"))) for c in _entries(file, data, "categories")}
-    images = {_id(image): image for image in _entries(file, data, "images")}
+    names = {
+        _key(c["id"]): label_of(str(_get(file, c, "category", "name"))) for c in _entries(file, data, "categories")
+    }
+    images = {_key(image["id"]): image for image in _entries(file, data, "images")}
     rows: dict[str, list[_Row]] = {key: [] for key in images}
     for one in _entries(file, data, "annotations"):
         image, kind = (_key(_get(file, one, "annotation", f"{what}_id")) for what in ("image", "category"))
@@ -272,10 +274,6 @@ def _get(file: Path, entry: dict[str, Any], what: str, key: str) -> object:
     if key not in entry:
         raise ConfigError(f"{file} is not in COCO format: an {what} has no `{key}`.".replace("an c", "a c"))
     return entry[key]
-
-
-def _id(entry: dict[str, Any]) -> str:
-    return _key(entry["id"])
 
 
 def _key(value: object) -> str:

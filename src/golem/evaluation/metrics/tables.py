@@ -10,7 +10,6 @@ from golem.evaluation.metrics.statistics import Distribution, Interval
 from golem.evaluation.metrics.summary import METRICS, NO_MODULE, MethodSummary, Metric, PairedMean, Summary, metric
 from golem.evaluation.metrics.text_table import TextTable, short_names
 
-SECONDS = Metric("", "s")
 OF_A_MEAN = "of a share Wilson's or, where a trial is not a yes or no, by betting; else Student's t, cut at what can be"
 """How the interval of a mean was found."""
 INTERVAL = "95 % interval"
@@ -36,7 +35,7 @@ def rates(summary: Summary) -> TextTable:
             f"{row.successes}/{row.n}",
             f"{percent(row.rate)} %",
             _interval(row.interval, 100.0),
-            *(_median(row.times.get(name), SECONDS) for name in times),
+            *(_median(row.times.get(name)) for name in times),
             ", ".join(f"{stage} {count}" for stage, count in row.stages.items()) or "-",
         )
         for row in summary.rows
@@ -204,10 +203,8 @@ def number(value: float, m: Metric) -> str:
     return f"{m.scale * value:.3g}"
 
 
-def _median(d: Distribution | None, m: Metric) -> str:
-    if d is None:
-        return "-"
-    return f"{number(d.median, m)} ({number(d.q1, m)} to {number(d.q3, m)}{f', n = {d.n}'})"
+def _median(d: Distribution | None) -> str:
+    return "-" if d is None else f"{d.median:.3g} ({d.q1:.3g} to {d.q3:.3g}, n = {d.n})"
 
 
 def _interval(interval: Interval | None, scale: float, sign: str = "") -> str:

@@ -163,18 +163,8 @@ class OdometryRung(Rung[OdometryOptions]):
 
     def run_together(self, specs: Sequence[TrialSpec]) -> Sequence[TrialOutcome]:
         """Let the robot walk once, and odometries hear what its sensors said under each condition."""
-        first = specs[0]
-        condition = _condition(first)
-        walk = lidar_walk.record_walk(
-            condition.route,
-            first.index,
-            seed=first.seed,
-            profile=first.profile,
-            legs=self.options.legs,
-            people=condition.people,
-            overrides=first.overrides,
-            onlooker=self.onlooker,
-        )
+        first, condition = specs[0], _condition(specs[0])
+        walk = lidar_walk.record_walk(first, condition.route, condition.people, self.options.legs, self.onlooker)
         outcomes: dict[Key, TrialOutcome] = {}
         for name in dict.fromkeys(spec.case["case"] for spec in specs):
             group = [spec for spec in specs if spec.case["case"] == name]
