@@ -129,8 +129,6 @@ def make_executor(where: str, processes: int) -> TrialExecutor:
     """
     kind, _, address = where.partition(":")
     if where == "local":
-        from golem.evaluation.harness.local_executor import LocalExecutor
-
         return LocalExecutor(processes)
     if kind == "dask" and address:
         return DaskExecutor(address)

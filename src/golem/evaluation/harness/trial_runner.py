@@ -9,7 +9,7 @@ import time
 from collections import Counter
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from tqdm import tqdm
@@ -104,8 +104,7 @@ class Request:
 
     def spec(self, method: str, index: int, case: Case) -> TrialSpec:
         """Return one trial."""
-        e = self.example
-        return TrialSpec(e.rung, method, e.profile, e.seed, index, e.overrides, e.options, case)
+        return replace(self.example, method=method, index=index, case=case)
 
     def results(self, method: str, case: Case, found: Mapping[Key, TrialOutcome]) -> list[TrialOutcome] | None:
         """Return the outcomes of one case in the order of indices; None until all are among `found`."""

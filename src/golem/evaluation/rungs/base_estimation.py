@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Hashable, Mapping, Sequence
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -268,7 +268,7 @@ def _estimates(method: str, states: Sequence[LowState]) -> tuple[Array, Array, A
     """Return pose (n, 4, 4), velocity (n, 3), whether it was stale (n,) and CPU time (n,) [s] of every tick."""
     choice, n = _choice(method), len(states)
     contract = ContractCheck(SLOT, choice.use)
-    estimator: BaseEstimator = registry.create(SLOT, choice.use, {**choice.options, **_impatient(choice.use)})
+    estimator = _impatient(choice)
     contract.call(estimator.reset, states[0])
     T, velocity, stale, ticks = np.empty((n, 4, 4)), np.empty((n, 3)), np.empty(n, dtype=bool), np.empty(n)
     for i, state in enumerate(states):
@@ -284,14 +284,11 @@ def _choice(method: str) -> Choice:
     return legs_stack("almi", "ideal", {SLOT: method}).choice(SLOT)
 
 
-def _impatient(use: str) -> dict[str, object]:
-    """Return the option under which an estimator calls itself stale at once, where it has that option."""
-    options: dict[str, object] = {"stale_after": 0.0}
-    try:
-        registry.create(SLOT, use, options)
-    except ConfigError:
-        return {}
-    return options
+def _impatient(choice: Choice) -> BaseEstimator:
+    """Return a new estimator that calls itself stale at once, where it has that option."""
+    with suppress(ConfigError):
+        return registry.create(SLOT, choice.use, {**choice.options, "stale_after": 0.0})
+    return registry.create(SLOT, choice.use, choice.options)
 
 
 def _way(T: Array, first: int, last: int) -> Array:

@@ -270,24 +270,21 @@ class FaultsRung(Rung[FaultOptions]):
 
     def tables(self, outcomes: Outcomes) -> Sequence[TextTable]:
         trials = [pair for each in outcomes.values() for pair in each]
-        rows, lost = list[tuple[str, ...]](), list[tuple[str, ...]]()
+        rows: list[tuple[str, ...]] = []
         for posture in self.options.posture:
             for source in ("command", "data", "device"):
-                mine = [
-                    o
-                    for s, o in trials
-                    if s.case["posture"] == posture and FAULTS[str(s.case["fault"])].source == source
-                ]
+                here = [(FAULTS[str(s.case["fault"])], o) for s, o in trials if s.case["posture"] == posture]
+                mine = [o for fault, o in here if fault.source == source]
                 stages = Counter(o.stage for o in mine if not o.success)
                 ends = ", ".join(f"{stage} {n}" for stage, n in stages.most_common())
                 won = sum(o.success for o in mine)
                 rows.append((posture, source, f"{won} of {len(mine)}", ends))
-        for spec, outcome in trials:
-            if not outcome.success:
-                lost.append((str(spec.case["posture"]), str(spec.case["fault"]), outcome.stage, outcome.detail))
+        lost = tuple(
+            (str(s.case["posture"]), str(s.case["fault"]), o.stage, o.detail) for s, o in trials if not o.success
+        )
         return (
             TextTable("Faults the safety layer dealt with", ("robot", "source", "right", "others"), tuple(rows)),
-            TextTable("The others", ("robot", "fault", "stage", "what happened"), tuple(lost)),
+            TextTable("The others", ("robot", "fault", "stage", "what happened"), lost),
         )
 
 

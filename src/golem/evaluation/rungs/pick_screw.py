@@ -35,7 +35,7 @@ from golem.provenance import stack_facts
 from golem.robots.mujoco.balance import TRACE, BalanceRecorder, BalanceTrace
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.mujoco.gl import shared_context
-from golem.robots.worlds.conditions import Conditions, LayoutKind, draw_conditions, world_stream
+from golem.robots.worlds.conditions import NAMES, Conditions, LayoutKind, draw_conditions, world_stream
 from golem.runtime.executor import when_stepped
 from golem.runtime.lockstep import LockstepRunner, build
 from golem.skills.base import FAULT, SkillResult
@@ -225,10 +225,15 @@ class PickOptions:
     """A condition whose values are tried one by one: NAME=FROM..TO, NAME=FROM..TO:COUNT or NAME=VALUE,VALUE."""
 
 
+def given(case: Case) -> Case:
+    """Return what of a case is a condition of the work place."""
+    return {name: value for name, value in case.items() if name in NAMES}
+
+
 def conditions_of(options: PickOptions, spec: TrialSpec) -> Conditions:
     """Return the conditions of a trial's work place."""
     rng = world_stream(episode_seed(spec.seed, spec.index))
-    return draw_conditions(options.layout, spec.case, rng, options.world)
+    return draw_conditions(options.layout, given(spec.case), rng, options.world)
 
 
 def let_go(running: LockstepRunner, robot: MujocoRobot) -> TrialOutcome | None:

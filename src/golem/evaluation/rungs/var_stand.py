@@ -8,21 +8,21 @@ from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
 from golem.capabilities.arms.reach_map import load_map
 from golem.capabilities.navigation.goto import GoTo
 from golem.errors import ConfigError
-from golem.evaluation.base import Case, Outcomes, Results, Rung, TrialOutcome, TrialSpec
+from golem.evaluation.base import Case, Results, Rung, TrialOutcome, TrialSpec
 from golem.evaluation.blame.oracles import with_modules
 from golem.evaluation.episodes.episode import Episode, Loss, episode_seed, lost
 from golem.evaluation.episodes.oracle import ContactWatch, Oracle, errors, place_error
 from golem.evaluation.episodes.pick_claims import claims
 from golem.evaluation.episodes.pick_watch import PickTouches, PickWatch
 from golem.evaluation.rungs.navigate_hall import DISTANCE, SPREAD, surveyed
-from golem.evaluation.rungs.pick_screw import SETTLE, PickOptions, PickRung, balance, judge_pick
+from golem.evaluation.rungs.pick_screw import SETTLE, PickOptions, PickRung, balance, given, judge_pick
 from golem.interfaces import topics
 from golem.middleware.bus import News
 from golem.robots.mujoco.balance import TRACE, BalanceRecorder
@@ -100,11 +100,10 @@ class VarStandRung(PickRung):
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
         seed, walks = episode_seed(spec.seed, spec.index), spec.case["start"] == "walked"
         stance = drawn_stance(spec, walks)
-        conditions = dict(_conditions(spec.case))
         stack = self._stack(spec.method, spec.profile, spec.overrides).with_options(
             "robot",
             layout=self.options.layout,
-            conditions=conditions,
+            conditions=given(spec.case),
             stance=[stance.x, stance.y, stance.yaw],
             world={"pack": "plant", "ioniq5": "ioniq5_plant"}[self.options.world] if walks else self.options.world,
             obstacles=self.options.obstacles if walks else 0,
@@ -118,13 +117,6 @@ class VarStandRung(PickRung):
                 if artefacts is not None and trial.recorder is not None:
                     trial.recorder.trace().save(artefacts / TRACE)
                 return outcome
-
-    def plot(self, outcomes: Outcomes, figure: Any) -> str | None:
-        placed = {
-            method: [(replace(spec, case=_conditions(spec.case)), outcome) for spec, outcome in rows]
-            for method, rows in outcomes.items()
-        }
-        return super().plot(placed, figure)
 
     def _stack(self, method: str, profile: str, overrides: Mapping[str, str]) -> Stack:
         if "robot" in overrides or "grasp_method" in overrides:
@@ -252,11 +244,6 @@ class _Trial:
 
     def _name(self, slot: str) -> str:
         return f"{slot}: {self._stack.choice(slot).use}"
-
-
-def _conditions(case: Case) -> Case:
-    """Return what of a case the place is drawn from."""
-    return {k: v for k, v in case.items() if k not in VarStandRung.varied}
 
 
 def drawn_stance(spec: TrialSpec, walks: bool) -> PlanarPose:

@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from golem.evaluation.base import DONE, Case, Outcomes, Results, TrialOutcome, TrialSpec
+from golem.evaluation.base import DONE, Outcomes, TrialOutcome, TrialSpec
 from golem.evaluation.episodes.episode import Episode, episode_seed
 from golem.evaluation.episodes.gantry_cell import GantryCell
 from golem.evaluation.episodes.oracle import ContactWatch, Oracle, Whereabouts, whereabouts
@@ -90,18 +90,11 @@ class WholePackRung(VarStandRung):
     Options = WholePackOptions
     options: Any
     default_n = 10
+    varied = {}
 
     @property
     def _goal(self) -> PickGoal:
         return PickGoal(side="either")
-
-    @property
-    def _loosened(self) -> Loosened:
-        """What is tried: of a whole pack everything, since some of what the list calls tight is loose."""
-        return "gantry" if self.options.gantry else "unknown" if self.options.part == "whole" else "list"
-
-    def cases(self, results: Results) -> Sequence[Case]:
-        return self._sweep
 
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
         stack = self._stack(spec.method, spec.profile, spec.overrides).with_options(
@@ -135,7 +128,9 @@ class WholePackRung(VarStandRung):
                     return min(touches.due(), contacts.due(), due, gantry.due if gantry else math.inf)
 
                 start = episode.t
-                goal = DisassembleGoal(list="pack.csv", loosened=self._loosened)
+                # Of a whole pack everything is tried, since some of what the list calls tight is loose.
+                some: Loosened = "list" if self.options.part == "edge" else "unknown"
+                goal = DisassembleGoal(list="pack.csv", loosened="gantry" if self.options.gantry else some)
                 visits = [(claim_name(slot), place_above(scene.layout, slot)) for slot, claimed in claims if claimed]
                 gantry = GantryCell(robot, episode.running.bus, visits, start) if self.options.gantry else None
                 episode.start(Disassemble(KeptFileConfig(folder.name)), goal)
