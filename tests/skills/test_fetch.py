@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -27,7 +28,7 @@ from golem.skills.remember import Remember
 from golem.skills.runner import SkillRun
 from golem.skills.take import Take
 from golem.skills.take_config import TakeReport
-from golem.types import SIDES, BaseEstimate, PlanarPose, Twist
+from golem.types import SIDES, Array, BaseEstimate, PlanarPose, Twist
 
 LEGS = LegStatus(
     0.0, Twist(), Twist(), False, "", False, False, PlanarPose(0.0, 0.0, 0.0), np.zeros(2), "hold", speed=0.0
@@ -61,16 +62,16 @@ class Scripted:
 def fetch(
     goal: FetchGoal, takes: Sequence[SkillResult], places: Sequence[SkillResult] = (DONE,), seen: bool = True,
     state: GripState = GripState.HOLDING, closes: GripState = GripState.EMPTY, T_odom_estimate: PlanarPose = HERE,
-    T_odom_map: PlanarPose | None = None,
+    T_odom_map: PlanarPose | None = None, speed: float = 0.0,
 ) -> tuple[SkillResult, dict[str, Scripted]]:  # fmt: skip
-    """Return how an errand of a robot that does not walk ended, and what was asked of which skill."""
+    """Return how an errand of a robot that walks at `speed` [m/s] ended, and what was asked of which skill."""
     skills = {"take": Scripted(Take, takes), "place": Scripted(SetDown, places), "remember": Scripted(Remember, [DONE])}
     memory = ObjectMap()
     if seen:
         memory.observe(look(98.0))
     context = Context(Bus(), Kinematics(), 0.01, modules(skill=skills.__getitem__, memory=memory))
     context.bus.publish(topics.MEMORY_STATUS, MemoryStatus(0.0, "odom", 100.0, 1), 0.0)
-    context.bus.publish(topics.LEG_STATUS, LEGS, 0.0)
+    context.bus.publish(topics.LEG_STATUS, replace(LEGS, speed=speed), 0.0)
     context.bus.publish(topics.hand_status("left"), HandStatus(0.0, state, 0.07, 0.0, np.zeros(2)), 0.0)
     context.bus.publish(topics.BASE, BaseEstimate(0.0, np.eye(4)), 0.0)
     context.bus.publish(topics.ODOMETRY, Odometry(ALWAYS, T_odom_estimate.matrix()), 0.0)
@@ -166,6 +167,23 @@ def test_a_failed_place_is_the_errands_failure() -> None:
     blocked = SkillResult(False, "detect", "localizer", "Something else stands at that place.")
     result, _ = fetch(FetchGoal("mug", (0.5, 0.1)), [TAKEN], [blocked])
     assert not result.success and result.reason == blocked.reason
+
+
+@pytest.mark.parametrize("value", [None, TakeReport(), TakeReport(x=0.5, y=0.1, z=-0.1)])
+def test_only_what_was_seen_is_gone_to_again(monkeypatch: pytest.MonkeyPatch, value: TakeReport | None) -> None:
+    gone: list[list[float]] = []
+
+    async def go(fetch: Fetch, context: Context, spot: Array, *_: object) -> int:
+        gone.append(spot.tolist())
+        return 1
+
+    monkeypatch.setattr(Fetch, "_go", go)
+    late = SkillResult(False, "timeout", None, "Not done after 90 s of robot time.", value=value)
+    result, skills = fetch(FetchGoal("mug", search=False), [late, late], speed=0.3)
+    assert not result.success
+    places = [[0.4, 0.0]] if value != TakeReport(x=0.5, y=0.1, z=-0.1) else [[0.4, 0.0], [0.5, 0.1]]
+    assert gone == [pytest.approx(place, abs=0.002) for place in places]
+    assert len(skills["take"].goals) == len(places)
 
 
 @pytest.mark.parametrize("wrong", [{"text": " "}, {"text": "mug", "to": (1.0,)}, {"text": "mug", "places": 0}])

@@ -268,7 +268,8 @@ class Fetch:
                 report.approaches += await self._go(context, spot)
             result = await self._take(context, goal, spot)
             found = result.value if isinstance(result.value, TakeReport) else TakeReport()
-            if result.success or _elsewhere(result) or not walks:
+            # One that ended before it saw the thing, or ran out of time, does not say where nearer is.
+            if result.success or _elsewhere(result) or not walks or found == TakeReport():
                 break
             context.say(result.stage, f"{result.reason} Trying again from a nearer stance.")
             spot = _for_legs(context, found)
