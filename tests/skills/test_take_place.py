@@ -175,8 +175,8 @@ def test_an_arm_that_hangs_low_is_raised_before_the_torso_turns(
     monkeypatch.setattr(PlannedMotion, "to_joints", to_joints)
     result = world.run(Take(TakeThingConfig(turn=0.4)).run(world.context, TakeGoal("mug"))).result
     assert result.reason == "The head camera shows no mug."
-    assert [sides for sides, _ in moves] == ([("right",), (), ()] if raises else [("right",)])
-    turns = [0.0, 0.4, -0.4]
+    assert [sides for sides, _ in moves] == ([("right",), (), (), ()] if raises else [("right",)])
+    turns = [0.0, 0.4, -0.4, 0.0]  # in the end it looks ahead again: the next take turns from there
     for (_, goal), turn in zip(moves, turns[: len(moves)], strict=True):
         np.testing.assert_allclose(goal, POSTURES["home"] + turn * np.eye(15)[0], atol=1e-9)
 

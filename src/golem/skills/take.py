@@ -134,7 +134,7 @@ class Take:
         """Return the thing as the head camera sees it with the torso turned to either side; None where it does not.
 
         The arms come along. One that is not at home is brought there first, unless it holds something: hanging low it
-        would sweep over what stands there. None turns into what the camera shows ahead.
+        would sweep over what stands there. None turns into what the camera shows ahead. In vain, it turns back.
         """
         c, ahead, home = self._config, context.commanded_joints.copy(), posture("home")
         away: list[Side] = [side for side in SIDES if np.abs((ahead - home)[ARM_COLUMNS[side]]).max() > AT_HOME]
@@ -148,7 +148,7 @@ class Take:
             except PlanRefused as refusal:
                 context.say("detect", f"The torso does not turn, since the {side} arm stays low: {refusal}")
                 return None
-        for turn in (c.turn, -c.turn):
+        for turn in (c.turn, -c.turn, 0.0):
             turned = ahead.copy()
             turned[0] += turn
             try:
@@ -156,7 +156,7 @@ class Take:
             except PlanRefused as refusal:
                 context.say("detect", f"The torso does not turn there: {refusal}")
                 continue
-            target = await find(context, label, expected, c.look_timeout)
+            target = await find(context, label, expected, c.look_timeout) if turn else None
             if target is not None:
                 return target
         return None
