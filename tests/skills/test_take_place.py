@@ -181,6 +181,29 @@ def test_an_arm_that_hangs_low_is_raised_before_the_torso_turns(
         np.testing.assert_allclose(goal, POSTURES["home"] + turn * np.eye(15)[0], atol=1e-9)
 
 
+def test_both_hands_go_home_that_were_tried_in_vain(world: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    at_home(world)
+    _, can = table_with_can()
+    world.objects["head"] = lambda: [can_at(can)]
+    raised, rested = list[str](), list[str]()
+
+    async def to_joints(motion: PlannedMotion, goal: Array, sides: Sequence[Side], hand_speed: float) -> None:
+        raised.extend(sides)
+
+    async def rest(motion: PlannedMotion, goal: Array, side: Side, hand_speed: float, stage: str) -> None:
+        rested.append(side)
+
+    async def propose(*_: object) -> list[object]:
+        return []
+
+    monkeypatch.setattr(PlannedMotion, "to_joints", to_joints)
+    monkeypatch.setattr(PlannedMotion, "rest", rest)
+    monkeypatch.setattr(Context, "propose", propose)
+    result = world.run(Take(TakeThingConfig(look_again=False)).run(world.context, TakeGoal("can"))).result
+    assert result.reason == "No grasp was proposed for the can."
+    assert raised == ["right", "left"] * 2 and rested == ["left", "right"]
+
+
 def test_an_empty_hand_places_nothing(world: Any) -> None:
     result = world.run(SetDown().run(world.context, PlaceGoal(0.4, 0.0))).result
     assert (result.stage, result.reason) == ("detect", "Neither hand holds anything.")

@@ -71,6 +71,7 @@ class Take:
     def __init__(self, config: TakeThingConfig | None = None) -> None:
         self._config = config or TakeThingConfig()
         self._report = TakeReport()
+        self._raised: list[Side] = []
         self.force = self._config.force
 
     def timeout(self, goal: TakeGoal) -> float:
@@ -193,6 +194,7 @@ class Take:
         yaw = context.heading + (0.5 * math.pi if side == "left" else -0.5 * math.pi)
         self._report.side, self._report.approach = side, kind
         context.say("approach", f"Bringing the {side} hand before the {target.label}, {kind}.", side=side)
+        self._raised = [*(one for one in self._raised if one != side), side]
         context.hands[side].open(MAX_GAP)
         scene = context.scene("head")
         with blaming("approach"):
@@ -301,10 +303,11 @@ class Take:
                 context.say("lift", "It slid in the fingers, and is held again.", side=side)
 
     async def _leave(self, context: Context, motion: PlannedMotion, home: Array) -> None:
-        """Open the hand, back off, and go home, as far as it can go."""
+        """Open the hand, back off, and go home, as far as it can go; the other hand, too, if it was tried before."""
         side: Side = "left" if self._report.side == "left" else "right"
         arm = context.arms[side]
         context.hands[side].open(MAX_GAP)
         if arm.sent:
             await arm.move(retracted(arm.commanded, self._config.before), self._config.travel_speed)
-        await motion.rest(home, side, self._config.travel_speed, "approach")
+        for one in reversed(self._raised):
+            await motion.rest(home, one, self._config.travel_speed, "approach")
