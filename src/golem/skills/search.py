@@ -15,7 +15,7 @@ from golem.options import require
 from golem.skills.base import SkillResult
 from golem.skills.context import Context
 from golem.skills.explore import LOOK, RADIUS
-from golem.skills.fetch import STAGE, TURN, before
+from golem.skills.fetch import SAME, STAGE, TURN, before
 from golem.skills.navigate import NavigateGoal
 from golem.skills.pose_goal import FIRST_REPORT
 from golem.skills.recall import RecalledPlaces, ask
@@ -94,17 +94,23 @@ class Search:
         others = memory.places(ANYTHING) if isinstance(memory, HasPlaces) else []
         places += [(float(p.position[0]), float(p.position[1])) for p in others]
         spots = [context.T_odom_memory @ PlanarPose(x, y, 0.0) for x, y in places]
-        targets = [before(here, np.array((spot.x, spot.y)), STAGE) for spot in spots]
+        targets = [before(here, np.array((spot.x, spot.y)), STAGE) for spot in spots if not _seen_from(gone, spot)]
         grid = context.bus.latest(topics.MAP)
         if grid is not None and mapped:
             local = context.T_odom_map.to(here)
             targets += [context.T_odom_map @ each.pose for each in frontiers(grid.in_map, RADIUS, local)]
-        if not targets:
+        if not (spots or targets):
             targets = [here @ PlanarPose(0.0, 0.0, TURN * turn) for turn in (1, -1)]
         for target in targets:
             if all(_apart(target, other) for other in (*gone, here)):
                 return target
         return None
+
+
+def _seen_from(gone: list[PlanarPose], spot: PlanarPose) -> bool:
+    """Return whether one of the poses that were `gone` to is before `spot`, from whichever side."""
+    ahead = (pose @ PlanarPose(STAGE, 0.0, 0.0) for pose in gone)
+    return any(math.hypot(there.x - spot.x, there.y - spot.y) < SAME for there in ahead)
 
 
 def _apart(a: PlanarPose, b: PlanarPose) -> bool:
