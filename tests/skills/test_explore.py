@@ -13,7 +13,7 @@ from tests.skills.test_walk import Ground, outcome
 from golem.interfaces import topics
 from golem.interfaces.nav_payloads import MapFile, MapPlace, OccupancyGrid
 from golem.middleware.bus import News
-from golem.skills.explore import Explore, ExploreGoal
+from golem.skills.explore import LEG, LOOK, SAVING, Explore, ExploreGoal
 from golem.skills.kept_file import KeptFileConfig
 from golem.types import PlanarPose, Twist
 
@@ -57,6 +57,11 @@ def test_it_sees_the_whole_room_and_comes_home(tmp_path: Path) -> None:
     assert (inside >= 0).mean() > 0.95
     assert abs(robot.pose.x) < 0.05 and abs(robot.pose.y) < 0.05
     assert robot.stages[0] == "explore" and robot.stages[-1] == "done" and "home" in robot.stages
+
+
+def test_the_last_frontier_the_way_home_and_the_map_get_their_time() -> None:
+    last, home = LEG + LOOK, 2.0 * LEG
+    assert Explore().timeout(ExploreGoal(timeout=100.0)) > 100.0 + last + home + SAVING
 
 
 def test_a_map_that_cannot_be_kept_is_said() -> None:

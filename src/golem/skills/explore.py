@@ -61,7 +61,8 @@ class Explore(KeepsFiles):
     Goal = ExploreGoal
 
     def timeout(self, goal: ExploreGoal) -> float:
-        return goal.timeout + 2.0 * LEG + FIRST_MAP + SAVING + MARGIN
+        # The last frontier may be set out for just before the goal's time is over; then home.
+        return goal.timeout + LEG + LOOK + 2.0 * LEG + FIRST_MAP + SAVING + MARGIN
 
     async def run(self, context: Context, goal: ExploreGoal) -> SkillResult:
         with standing_after_failure(context):
