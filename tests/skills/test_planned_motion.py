@@ -30,7 +30,7 @@ from golem.skills.context import Context, Modules
 from golem.skills.planned_motion import FARTHEST, PlannedMotion, Then, apart
 from golem.skills.runner import SkillRun
 from golem.skills.travel import LineTravel, PlannedTravel
-from golem.types import NUM_JOINTS, UPPER, Array, BaseEstimate, Imu, LowState
+from golem.types import NUM_JOINTS, UPPER, Array, BaseEstimate, Imu, LowState, Side
 
 PERIOD = 0.01
 DONE = SkillResult(True, "done", None, "There.")
@@ -197,15 +197,31 @@ def test_arms_that_touch_the_robot_come_off_and_go_on(rig: Rig) -> None:
     assert (space.verdicts(way[0]) == 0).all()
 
 
-def test_arms_that_hang_are_raised_before_the_work_begins(planner: RrtConnect) -> None:
+async def refused(*_: object) -> None:
+    raise PlanRefused(Refusal.NO_PATH, "There is no way.")
+
+
+def test_arms_that_hang_are_raised_before_the_work_begins_and_return_there(
+    planner: RrtConnect, monkeypatch: pytest.MonkeyPatch
+) -> None:
     home, left = posture("home"), np.array([0.06, 0.03, 0.30, 1.56, 2.10, -0.26, -0.69])
     rig = Rig(planner, np.array([0.0, *left, *(left * (1.0, -1.0, -1.0, 1.0, -1.0, 1.0, -1.0))]))
     assert JointSpace(PlanningRobot(), rig.q).verdict(rig.q) == ITSELF
 
+    sent: list[Array] = []
+
+    async def go(lines: LineTravel, side: Side, T_goal: Array, speed: float) -> None:
+        sent.append(T_goal)
+
     async def begin(context: Context) -> SkillResult:
-        await PlannedTravel(context, LineTravel(context, 0.1, 0.002), 0.002).begin(0.25)
+        travel = PlannedTravel(context, LineTravel(context, 0.1, 0.002), 0.002)
+        await travel.begin(0.25)
+        monkeypatch.setattr(PlannedMotion, "to_joints", refused)
+        await travel.home("right", 0.25)
+        np.testing.assert_allclose(sent, context.arms["right"].pose[None], atol=1e-3)
         return DONE
 
+    monkeypatch.setattr(LineTravel, "_go", go)
     assert rig.run(begin(rig.context)).result == DONE
     np.testing.assert_allclose(rig.q, home, atol=1e-6)
 

@@ -88,7 +88,8 @@ class LineTravel:
         self._homes = {side: context.arms[side].pose for side in SIDES}
 
     async def begin(self, speed: float) -> None:
-        """Stay: lines begin anywhere."""
+        """Stay: lines begin anywhere; hands return to where they are now."""
+        self._homes = {side: self._context.arms[side].pose for side in SIDES}
 
     def look(self, targets: Sequence[Array]) -> None:
         """Look at nothing."""
@@ -141,6 +142,7 @@ class PlannedTravel:
         with blaming("begin"):
             await self._motion.to_joints(home, SIDES, speed)
         self._home = home
+        await self._lines.begin(speed)
 
     def look(self, targets: Sequence[Array]) -> None:
         self._motion.look([(target, SPARED) for target in targets])
