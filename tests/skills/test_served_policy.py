@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -14,10 +15,11 @@ from tests.capabilities.policies.servers import late, policy_server
 from tests.dashboard.conftest import BLIND
 
 from golem.capabilities.policies.vectors import ACTION, GRIPS, STATE
+from golem.interfaces import topics
 from golem.runtime.lockstep import build
 from golem.skills.base import SkillResult
 from golem.stack import Stack
-from golem.types import Array
+from golem.types import Array, Twist
 
 PALMS = slice(list(STATE).index("left_palm.x"), list(STATE).index("left_palm.x") + 18)
 
@@ -91,3 +93,19 @@ def test_a_policy_that_fails_leaves_the_arms_where_they_were(answer: Any, words:
     assert not result.success and result.stage == "policy" and words in result.reason
     assert result.reason.count("The arms stay where they are.") == 1
     assert np.linalg.norm(moved, axis=1).max() < 0.012  # what the hoist sways
+
+
+def test_cancelled_it_leaves_the_legs_standing(world: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    from golem.capabilities.policies.openpi import PolicyLinkConfig
+    from golem.skills import served_policy
+
+    link = SimpleNamespace(close=lambda: None, step=lambda *_: np.zeros(len(ACTION)))
+    monkeypatch.setattr(served_policy, "open_policy", lambda config: (link, config))
+    monkeypatch.setattr(served_policy, "ActionStream", lambda *_: link)
+    monkeypatch.setattr(served_policy.PolicySkill, "_do", lambda self, context, action: context.legs.drive(Twist(0.3)))
+    skill = served_policy.PolicySkill(PolicyLinkConfig(cameras=()))
+    run = world.run(skill.run(world.context, served_policy.PolicyGoal()), 5)
+    assert world.bus.latest(topics.TWIST) == Twist(0.3)
+    run.cancel()
+    assert run.result is not None and run.result.stage == "cancelled"
+    assert world.bus.latest(topics.TWIST) == Twist()

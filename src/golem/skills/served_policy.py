@@ -67,9 +67,9 @@ class PolicySkill:
                         self._do(context, action)
                     await context.tick()
             except (ServiceUnavailable, ActionRefused) as fault:
-                context.legs.drive(Twist())
                 return SkillResult(False, "policy", "skill", f"{fault} The arms stay where they are.")
-        context.legs.drive(Twist())
+            finally:
+                context.legs.drive(Twist())
         return SkillResult(True, "done", None, f"The policy moved the robot for {goal.seconds:g} s.")
 
     def _do(self, context: Context, action: Array) -> None:
