@@ -204,6 +204,30 @@ def test_both_hands_go_home_that_were_tried_in_vain(world: Any, monkeypatch: pyt
     assert raised == ["right", "left"] * 2 and rested == ["left", "right"]
 
 
+@pytest.mark.parametrize("side", ["right", "either"])
+def test_a_hand_that_holds_something_does_not_let_it_fall_for_another_thing(
+    world: Any, monkeypatch: pytest.MonkeyPatch, side: Any
+) -> None:
+    at_home(world)
+    _, can = table_with_can()
+    world.objects["head"] = lambda: [can_at(can)]
+    world.grips, asked = [True], list[str]()
+    world.context.hands["right"].close(5.0)
+    for _ in range(20):
+        world.step()
+    assert world.holds
+
+    async def come(take: Take, context: Context, *given: Any) -> None:
+        asked.append(given[3])
+        raise StageFailed("approach", "planner", "There is no way.")
+
+    monkeypatch.setattr(Take, "_come", come)
+    result = world.run(Take().run(world.context, TakeGoal("can", side))).result
+    assert asked == ([] if side == "right" else ["left", "left"])
+    assert (result.success, result.stage) == (False, "approach") and world.holds
+    assert side == "either" or result.reason == "The right hand already holds something."
+
+
 def test_an_empty_hand_places_nothing(world: Any) -> None:
     result = world.run(SetDown().run(world.context, PlaceGoal(0.4, 0.0))).result
     assert (result.stage, result.reason) == ("detect", "Neither hand holds anything.")

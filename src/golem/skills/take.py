@@ -165,10 +165,17 @@ class Take:
     async def _approach(
         self, context: Context, motion: PlannedMotion, goal: TakeGoal, target: LocalizedObject
     ) -> tuple[Side, Grasp]:
-        """Bring an open hand before the thing; returns the hand and the grasp that it can go on to."""
+        """Bring an open hand before the thing; returns the hand and the grasp that it can go on to.
+
+        A hand that holds something is none of them: it would let that fall.
+        """
         T = np.linalg.inv(context.T_odom_base)
         left = float((T[:3, :3] @ target.position + T[:3, 3])[1]) > 0.0
         sides: tuple[Side, ...] = (goal.side,) if goal.side != "either" else SIDES if left else SIDES[::-1]
+        full = [side for side in sides if context.hands[side].status.holding]
+        sides = tuple(side for side in sides if side not in full)
+        if not sides:
+            raise StageFailed("approach", "skill", f"The {' and the '.join(full)} hand already holds something.")
         kinds = (goal.approach,) if goal.approach != "either" else (TOP, FORWARD)
         method, why = context.grasp_method(), list[StageFailed]()
         for kind in kinds:
