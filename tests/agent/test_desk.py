@@ -223,6 +223,18 @@ def test_a_call_that_waits_can_be_taken_back(rig: Rig) -> None:
     assert not ended(rig, call)["success"] and rig.body.began == []
 
 
+@given(Rules(calls=1000))
+def test_what_cannot_begin_after_the_operators_yes_is_refused(rig: Rig) -> None:
+    def begin(skill: str, fields: dict[str, Any]) -> None:
+        raise ZeroDivisionError("a skill of somebody's")
+
+    rig.body.begin = begin  # pyright: ignore[reportAttributeAccessIssue]
+    call = ask(rig, "go", x=1.0)
+    rig.desk.decide(call.number, True)
+    data = ended(rig, call)
+    assert not data["success"] and "ZeroDivisionError" in reason(data)
+
+
 def test_nothing_goes_on_for_a_client_that_is_gone(rig: Rig) -> None:
     call = ask(rig, "go", "a", x=1.0, steps=100)
     rig.desk.leave("a")

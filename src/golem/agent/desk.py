@@ -339,6 +339,8 @@ class Desk:
             self._begin(call)
         except GolemError as error:
             self._refuse(call, str(error))
+        except Exception as error:  # a skill is a user's
+            self._refuse(call, f"{type(error).__name__}: {shorten(str(error))}")
 
     def _refuse(self, call: Call, reason: str) -> None:
         self._tell("refuse", call, why=reason)
