@@ -60,6 +60,13 @@ def test_the_schemas_of_every_shipped_skill_are_sound(tmp_path: Path) -> None:
     assert tools["open"].takes["properties"]["angle"]["maximum"] == 1.2 and "operator" in tools["open"].text
 
 
+def test_a_list_of_no_words_allows_none_and_is_shown(tmp_path: Path) -> None:
+    rig = Rig(tmp_path, Rules(tools={"go": ToolRule("free", fields={"label": []})}))
+    go = next(tool for tool in tool_specs(rig.desk) if tool.name == "go")
+    assert go.takes["properties"]["label"]["enum"] == []
+    assert not rig.desk.call("go", {"x": 1.0})["success"] and rig.body.began == []
+
+
 @pytest.mark.parametrize("mode", ["auto", "legacy"])
 def test_the_client_lists_and_calls_everything(tmp_path: Path, mode: str) -> None:
     rig = Rig(tmp_path, FREE)

@@ -53,7 +53,7 @@ def _narrowed(schema: Schema, path: list[str], allowed: list[Any]) -> Schema:
     of = schema.get("properties", {}).get(path[0])
     if of is None:
         return schema
-    words = isinstance(allowed[0], str)
+    words = not allowed or isinstance(allowed[0], str)
     narrow = {"enum": allowed} if words else dict(zip(("minimum", "maximum"), allowed, strict=True))
     if len(path) > 1:
         of = _narrowed(of, path[1:], allowed)
