@@ -17,6 +17,7 @@ from golem.agent.mcp_server import http_app, make_server, tool_specs
 from golem.agent.tool_rules import Rules, ToolRule
 from golem.agent_command import McpConfig, run_mcp
 from golem.errors import ConfigError
+from golem.interfaces.payloads import Feedback
 from golem.runtime.skill_table import SkillTable
 from golem.stack import Stack
 
@@ -129,6 +130,30 @@ def test_a_call_that_is_cancelled_stops_the_robot(tmp_path: Path, mode: str) -> 
 
     served(rig, talk)
     assert rig.body.x < 9.0 and "cancel" in rig.events()
+
+
+def test_what_a_skill_says_after_its_client_left_disturbs_nobody(tmp_path: Path) -> None:
+    rig = Rig(tmp_path, FREE)
+    step, said = rig.body.step, rig.body.said
+    rig.body.step = lambda: (threading.Event().wait(0.005), step())[1]
+    loop = asyncio.new_event_loop()
+    threading.Thread(target=loop.run_forever, daemon=True).start()
+
+    async def talk() -> None:
+        async with mcp.Client(make_server(rig.desk)) as client:
+            await client.call_tool("go", {"x": 1.0, "steps": 100})
+
+    talking = asyncio.run_coroutine_threadsafe(talk(), loop)
+    rig.desk.run(lambda: rig.body.x > 0.0)
+    loop.call_soon_threadsafe(loop.stop)
+    while loop.is_running():
+        threading.Event().wait(0.01)
+    talking.cancel()
+    loop.close()
+    news = iter([Feedback(1.0, "go", "stand", "It stands.")])
+    rig.body.said = lambda: next(news, None) or said()
+    rig.desk.leave_all()
+    assert not rig.body.busy and next(news, None) is None
 
 
 def test_a_port_that_cannot_be_had_is_said_before_a_robot_is_built(monkeypatch: pytest.MonkeyPatch) -> None:

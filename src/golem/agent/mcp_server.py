@@ -8,6 +8,7 @@ import hmac
 import json
 import socket
 from collections.abc import Awaitable, Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
@@ -126,7 +127,8 @@ async def _called(desk: Desk, context: Any, tool: str, arguments: dict[str, Any]
     loop, said = asyncio.get_running_loop(), asyncio.Queue[Feedback]()
 
     def tell(feedback: Feedback) -> None:
-        loop.call_soon_threadsafe(said.put_nowait, feedback)
+        with suppress(RuntimeError):  # the loop is closed: the client has left, and its skill still cleans up
+            loop.call_soon_threadsafe(said.put_nowait, feedback)
 
     call = Call(_who(context), tool, arguments, tell)
     answered, start = asyncio.wrap_future(desk.submit(call)), None
