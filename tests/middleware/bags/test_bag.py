@@ -192,6 +192,14 @@ def test_an_empty_bag_is_a_bag(tmp_path: Path) -> None:
     assert bag.finished and not bag.topics and not list(bag.messages())
 
 
+def test_a_file_that_got_nothing_leaves_the_others_readable(tmp_path: Path) -> None:
+    folder = tmp_path / "bag"
+    sent = write(folder, 3)
+    (folder / "bag_1.mcap").touch()
+    assert same(list(Bag(folder).messages()), sent)
+    assert repair(folder) == [] and same(list(Bag(folder).messages()), sent)
+
+
 def test_damage_is_named(tmp_path: Path) -> None:
     """Whatever happens to the bytes: a bag, perhaps with fewer messages, or a BagError."""
     write(tmp_path / "bag", 10, BagConfig(chunk=2000, compression="zstd"))

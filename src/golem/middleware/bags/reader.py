@@ -223,7 +223,8 @@ def _files(path: Path) -> list[Path]:
         below = ", ".join(map(str, sorted({b.parent for d in BELOW for b in path.glob(d)})[-LISTED:]))
         ways = f"one of {below}" if below else "an MCAP file, or the folder that holds its *.mcap files"
         raise BagError(f"No bag at {path}; give {ways}.")
-    return found
+    # The disk was full, or the power gone, before one that was just begun got its first bytes.
+    return [file for file in found if file.stat().st_size] or found
 
 
 def _extent(path: Path, file: IO[bytes]) -> tuple[bool, int]:
