@@ -260,6 +260,7 @@ def test_a_part_is_played_with_what_holds_at_its_start(tmp_path: Path) -> None:
     bag = bag_of(tmp_path / "bag", said)
     played = Played(bag, replace(FAST, start=2.5, stop=4.5))
     assert played.words == ["2", "3"] and played.model == ["new"]
+    assert played.ticks == [pytest.approx(4.0 + 0.01 * i) for i in range(101)]  # not from 1.5 s on, in one burst
     assert Played(bag, replace(FAST, topics=("/words",))).model == []
     with pytest.raises(ConfigError, match="Did you mean '/words'"):
         Played(bag, replace(FAST, topics=("/word",)))

@@ -7,7 +7,7 @@ import struct
 import threading
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from golem.errors import ConfigError, unknown_name
 from golem.middleware.bags.base import BagError, BagMessage, BagTopic
@@ -137,7 +137,7 @@ class Player:
                     held[message.topic.name] = message
                 continue
             for holding in held.values():
-                yield elapsed, holding
+                yield elapsed, replace(holding, log_time=message.log_time)  # it holds now: /clock begins here
             held.clear()
             yield elapsed, message
 
