@@ -166,3 +166,8 @@ def test_a_session_is_made_again(tmp_path: Path) -> None:
     assert now.body.began == then.body.began
     never = Rig(tmp_path, Rules(default="never", calls=100))
     assert [b for _, _, b in replay(then.file, never.desk.call)] == [False, False, True, False]
+
+
+def test_no_screws_are_taken_where_none_are_wanted() -> None:
+    report, calls = said("take out 0 screws")
+    assert report.done and report.facts["taken"] == 0 and [tool for tool, _ in calls if tool == "pick"] == []

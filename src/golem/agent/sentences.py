@@ -139,12 +139,12 @@ class SentencePlanner:
 
     def _screws(self, number: str = "all", side: str = "") -> ErrandReport:
         """Pick what is seen on a side, the nearest to the middle first, until so many are out; look again for more."""
-        wanted = int(number) if number.isdecimal() else NUMBERS.get(number, 0)
+        wanted = int(number) if number.isdecimal() else NUMBERS.get(number)
         taken, ends, tried = 0, dict[str, list[list[float]]](), list[tuple[float, float]]()
         lost: tuple[str, str | None] = ("detect", "localizer")
         for _ in range(LOOKS):
             places = [(x, y) for x, y in self._seen(side) if all(math.dist((x, y), at) > APART for at in tried)]
-            wanted = wanted or len(places)
+            wanted = len(places) or None if wanted is None else wanted
             for x, y in places:
                 if taken == wanted:
                     break
@@ -159,7 +159,7 @@ class SentencePlanner:
                     ends.setdefault(hands[-1]["outcome"]["text"], []).append([hands[-1]["x"], hands[-1]["y"]])
         text = f"{taken} screws are out" + "".join(f"; {len(places)} {end}" for end, places in ends.items())
         facts = {"taken": taken} | {end: ends.get(end, []) for end in ("tight", "jammed")}
-        return ErrandReport(taken >= wanted, f"{text}.", facts, *lost)
+        return ErrandReport(taken >= (wanted or 0), f"{text}.", facts, *lost)
 
     def _seen(self, side: str) -> list[tuple[float, float]]:
         """Return x, y in odom [m] of the screws that are in view on a side, the nearest to the middle first."""
