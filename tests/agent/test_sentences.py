@@ -168,6 +168,13 @@ def test_a_session_is_made_again(tmp_path: Path) -> None:
     assert [b for _, _, b in replay(then.file, never.desk.call)] == [False, False, True, False]
 
 
+def test_each_call_is_compared_with_the_answer_of_its_own_start(tmp_path: Path) -> None:
+    for rules in (Rules(default="free"), Rules(default="never")):
+        Rig(tmp_path, rules).desk.call("go", {"x": 1.0})
+    now = Rig(tmp_path / "now", Rules(default="free"))
+    assert [(a, b) for _, a, b in replay(tmp_path / "audit.jsonl", now.desk.call)] == [(True, True), (False, True)]
+
+
 def test_no_screws_are_taken_where_none_are_wanted() -> None:
     report, calls = said("take out 0 screws")
     assert report.done and report.facts["taken"] == 0 and [tool for tool, _ in calls if tool == "pick"] == []

@@ -178,7 +178,16 @@ def replay(file: Path, use: Use) -> Iterator[tuple[str, bool, bool]]:
 
     Raises ConfigError: the log cannot be read, or was changed.
     """
-    entries = read_audit(file)
+    starts: list[list[dict[str, Any]]] = []  # each numbers its calls from 1
+    for entry in read_audit(file):
+        if entry["event"] == "begin" or not starts:
+            starts.append([])
+        starts[-1].append(entry)
+    for entries in starts:
+        yield from _replay(entries, use)
+
+
+def _replay(entries: list[dict[str, Any]], use: Use) -> Iterator[tuple[str, bool, bool]]:
     ends = {(e["session"], e["number"]): e for e in entries if e["event"] in ("answer", "refuse")}
     for entry in entries:
         if entry["event"] == "call" and isinstance(entry["arguments"], dict):
