@@ -84,3 +84,17 @@ def test_what_is_refused_stands_at_the_gizmo() -> None:
     right.position = np.zeros(3)
     gizmos.show({"left": T, "right": T})
     np.testing.assert_allclose(right.position, 0.0)  # it is in somebody's hand
+
+
+def test_a_gizmo_stays_in_the_hand_that_drags_it_when_another_window_goes() -> None:
+    server, pilot = Server(), HandPilot()
+    gizmos = Gizmos(server, lambda p: p + ORIGIN, pilot, Driving(pilot))  # type: ignore[arg-type]
+    right = server.handles["/world/right_goal"]
+    right.mouse("start", 1)
+    right.position = np.array([0.4, -0.2, 1.1])
+    server.gone(SimpleNamespace(client_id=2))
+    gizmos.show({"left": np.eye(4), "right": np.eye(4)})
+    np.testing.assert_allclose(right.position, (0.4, -0.2, 1.1))
+    server.gone(SimpleNamespace(client_id=1))
+    gizmos.show({"left": np.eye(4), "right": np.eye(4)})
+    np.testing.assert_allclose(right.position, ORIGIN)

@@ -118,7 +118,7 @@ class Gizmos:
     ) -> None:
         """Add them; `from_odom` brings a point (3,) of odom into the world that is shown, whose axes are the same."""
         self._origin, self._pilot, self._driving = from_odom(np.zeros(3)), pilot, driving
-        self._held: set[Side] = set()
+        self._held: dict[Side, set[str]] = {side: set() for side in SIDES}
         self._gizmos, self._labels = {}, {}
         for side in SIDES:
             gizmo = server.scene.add_transform_controls(f"{WORLD}/{side}_goal", scale=0.15, visible=False)
@@ -128,15 +128,17 @@ class Gizmos:
         server.on_client_disconnect(lambda client: self._gone(str(client.client_id)))
 
     def _drag(self, event: Any, side: Side) -> None:
-        if event.phase == "end":
-            self._held.discard(side)
+        who, ends = f"view {event.client_id}", event.phase == "end"
+        if ends:
+            self._held[side].discard(who)
         else:
-            self._held.add(side)
-        goal = gizmo_pose(self._gizmos[side], self._origin) if side in self._held else None
-        self._pilot.drag(f"view {event.client_id}", side, goal, time.monotonic())
+            self._held[side].add(who)
+        goal = None if ends else gizmo_pose(self._gizmos[side], self._origin)
+        self._pilot.drag(who, side, goal, time.monotonic())
 
     def _gone(self, client: str) -> None:
-        self._held.clear()
+        for held in self._held.values():
+            held.discard(f"view {client}")
         self._pilot.leave(f"view {client}")
 
     def show(self, poses: dict[Side, Array]) -> None:
@@ -144,7 +146,7 @@ class Gizmos:
         for side in SIDES:
             gizmo, label, why = self._gizmos[side], self._labels[side], self._driving.refused[side]
             T = poses[side]
-            if side not in self._held:
+            if not self._held[side]:
                 place_gizmo(gizmo, T, self._origin)
                 gizmo.visible = True
             label.visible = bool(why)
