@@ -85,6 +85,20 @@ def odom(x: float) -> bytes:
     return bytes(codec.serialize(Odometry(pose=PoseWithCovariance(pose=convert.pose(T)))))
 
 
+def test_frames_of_any_topic_that_nobody_can_read_are_left_out(tmp_path: Path) -> None:
+    bag, image = BagWriter(tmp_path / "bag"), public.image("head", public.COLOR)
+    payloads = dict.fromkeys(("/odom", "/safety/status", image), b"\0\1\0\0damaged") | {
+        "/lowstate": encode_low_state(state(0.0))
+    }
+    for name, payload in payloads.items():
+        row = public.topic(name)
+        bag.write(BagMessage(topic(row.name, row.type, row.qos), 10, 10, payload))
+    bag.close()
+    recording = read_recording(tmp_path / "bag")
+    assert len(recording.times) == 1 and recording.bases == (None,) and recording.stop is None
+    assert recording.picture(image, 0.0) is None
+
+
 def test_any_bag_is_played_from_its_start(tmp_path: Path) -> None:
     """States are thinned, the robot stands where /odom says, and a picture belongs to its moment."""
     rows, bag = dict[str, BagTopic](), BagWriter(tmp_path / "bag")

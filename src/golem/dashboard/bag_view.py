@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import threading
 from collections.abc import Sequence
-from contextlib import closing, redirect_stdout
+from contextlib import closing, redirect_stdout, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -27,6 +27,7 @@ from golem.interfaces.ros_convert import matrix, to_gate_status
 from golem.middleware.bags.reader import Bag
 from golem.middleware.interrupt import interrupted
 from golem.middleware.ros import codec
+from golem.middleware.ros.message import CodecError
 from golem.middleware.ros.msgs.golem_interfaces import SafetyStatus
 from golem.middleware.ros.msgs.nav_msgs import Odometry
 from golem.middleware.ros.msgs.sensor_msgs import Image
@@ -51,6 +52,8 @@ FRESH = 0.5
 """Age up to which a picture belongs to a moment [s]."""
 PLOTTED = 10.0
 """Time that is plotted before and after a moment [s]."""
+UNREADABLE = (CodecError, WireError)
+"""What is raised of a frame that nobody can read."""
 CAMERAS = {public.image(camera, public.COLOR): camera.replace("_", " ") for camera in public.CAMERAS}
 
 
@@ -102,7 +105,10 @@ class Recording:
         """Return (height, width, 3) RGB, the newest image of a topic at `t` [s]; None if there is none of then."""
         until = self.zero + round(t * 1e9)
         seen = [m.payload for m in self.bag.messages((topic,), until - round(FRESH * 1e9), until + 1)]
-        return images.to_rgb(codec.deserialize(seen[-1], Image)) if seen else None
+        for payload in reversed(seen):
+            with suppress(*UNREADABLE):
+                return images.to_rgb(codec.deserialize(payload, Image))
+        return None
 
 
 def read_recording(path: Path) -> Recording:
@@ -131,7 +137,7 @@ def read_recording(path: Path) -> Recording:
             elif not rows or t - rows[-1][0] > 0.95 * SPARSE or (stop is not None and abs(t) < DENSE):
                 machine = convert.mode_machine(message.payload)
                 rows.append((t, convert.decode_low_state(message.payload), told, base, gate))
-        except WireError:
+        except UNREADABLE:
             continue
     if not rows:
         raise ConfigError(f"'{path}' holds no /lowstate: no robot can be shown. `golem replay` plays other topics.")
@@ -145,7 +151,7 @@ def _first_stop(bag: Bag) -> tuple[GateStatus | None, int]:
     for message in bag.messages(("/safety/status",)):
         try:
             status = to_gate_status(codec.deserialize(message.payload, SafetyStatus))
-        except WireError:
+        except UNREADABLE:
             continue
         if status.stopped:
             return status, message.log_time
