@@ -23,7 +23,7 @@ from golem.skills.pick_config import PickConfig, PickFailed, PickOutcome, PickRe
 from golem.skills.pick_targets import Attempt, Container, HandReach, PickChoice, positions
 from golem.skills.poses import lifted, moved, turned
 from golem.skills.travel import Travel
-from golem.skills.ware_sight import palm_view
+from golem.skills.ware_sight import beyond_fingers
 from golem.types import Array, Side
 
 LEAD = 0.03
@@ -34,6 +34,8 @@ HIGHER = 0.10
 """How much higher a hand looks that does not see the container from where it lets go [m]."""
 INSIDE = 0.03
 """A hand this near to the container's middle lets go there [m]."""
+FARTHEST = 0.2
+"""What the palm camera takes for the container farther than this from where it should be is another one [m]."""
 LEANS = (0.0, 0.35)
 """How far a hand leans outwards that lets go [rad]: leaning, the fingers get some centimetres further."""
 SHARES = (1.0, 0.75, 0.5, 0.25)
@@ -181,10 +183,20 @@ async def _nearer(
 
 
 async def _to_middle(context: Context, config: PickConfig, attempt: Attempt, box: OpenBox) -> Array | None:
-    """Return (3,) the level way from the hand to the middle of `box` where the palm camera shows it, in odom [m]."""
-    points = await palm_view(context, attempt.side, attempt.container, config.look_timeout, 1)
-    found = find_box(box, points)
-    return None if found is None else np.append(found.center - context.arms[attempt.side].pose[:2, 3], 0.0)
+    """Return (3,) the level way from the hand to the middle of `box` where the palm camera shows it, in odom [m].
+
+    It is looked for around each thing that the camera takes for the container, mostly one half of it, and around their
+    mean; where it takes nothing for it, around where it should be.
+    """
+    side = attempt.side
+    with context.watch(f"{side}_hand", attempt.container, doubtful=(attempt.container,)) as eye:
+        sightings = await eye.look(config.look_timeout)
+    if sightings is None:
+        return None
+    there = [o.position[:2] for o in sightings.objects if o.label == attempt.container]
+    there = [at for at in there if np.linalg.norm(at - box.center) < FARTHEST] or [box.center]
+    found = find_box(box, beyond_fingers(context, side), [*there, np.mean(there, axis=0)])
+    return None if found is None else np.append(found.center - context.arms[side].pose[:2, 3], 0.0)
 
 
 async def look_after(

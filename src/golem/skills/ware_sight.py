@@ -72,16 +72,19 @@ async def find(
     return None
 
 
-async def palm_view(context: Context, side: Side, label: str, seconds: float, frames: int = FRAMES) -> Array:
+async def palm_view(context: Context, side: Side, label: str, seconds: float) -> Array:
     """Return the (n, 3) points in odom that the palm camera shows beyond the fingertips [m]; n may be 0."""
-    camera = f"{side}_hand"
-    with context.watch(camera, label) as eye:
+    with context.watch(f"{side}_hand", label) as eye:
         end = context.t + seconds
-        for _ in range(frames):
+        for _ in range(FRAMES):
             if await eye.look(end - context.t) is None:
                 return np.zeros((0, 3))
-    T = context.arms[side].pose
-    points = context.scene(camera)
+    return beyond_fingers(context, side)
+
+
+def beyond_fingers(context: Context, side: Side) -> Array:
+    """Return the (n, 3) points in odom beyond the fingertips that the palm camera's newest frame shows [m]."""
+    T, points = context.arms[side].pose, context.scene(f"{side}_hand")
     return points[(points - T[:3, 3]) @ T[:3, 2] > TIPS]
 
 

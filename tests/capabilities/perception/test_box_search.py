@@ -40,7 +40,7 @@ def known(off: Array, raised: float = 0.0) -> OpenBox:
 def test_the_middle_is_found_behind_fingers_and_where_the_view_ends(
     off: tuple[float, float], cut: float, pack: float
 ) -> None:
-    found = find_box(known(np.array(off), raised=-0.02), view(cut=cut, pack=pack))
+    found = find_box(known(np.array(off), raised=-0.02), view(cut=cut, pack=pack), [THERE + off])
     assert found is not None
     assert np.linalg.norm(found.center - THERE) < 0.02  # a hand that is 3 cm off goes no nearer
     assert found.rim == pytest.approx(RIM, abs=0.01) and found.level == pytest.approx(LEVEL, abs=0.01)
@@ -48,13 +48,20 @@ def test_the_middle_is_found_behind_fingers_and_where_the_view_ends(
 
 
 def test_a_tray_that_is_farther_off_or_hardly_in_view_is_not_found() -> None:
-    assert find_box(known(np.array([0.0, 3.0 * SEARCHED])), view()) is None
-    assert find_box(known(np.zeros(2)), view(cut=0.19)) is None
-    assert find_box(known(np.zeros(2)), np.zeros((0, 3))) is None
+    assert find_box(known(np.zeros(2)), view(), [THERE + (0.0, 3.0 * SEARCHED)]) is None
+    assert find_box(known(np.zeros(2)), view(cut=0.19), [THERE]) is None
+    assert find_box(known(np.zeros(2)), np.zeros((0, 3)), [THERE]) is None
+
+
+def test_of_several_places_that_a_detector_names_the_likest_counts() -> None:
+    halves = [THERE + (0.02, 0.06), THERE + (-0.02, -0.06), THERE + (0.3, 0.3)]
+    for around in (halves, halves[::-1]):
+        found = find_box(known(np.array([0.1, 0.15])), view(), around)
+        assert found is not None and np.linalg.norm(found.center - THERE) < 0.02
 
 
 def test_a_plane_and_a_step_are_no_tray() -> None:
     rng = np.random.default_rng(4)
     flat = rng.uniform(-0.25, 0.25, (60_000, 2)) + THERE
     for z in (np.full(len(flat), RIM), np.where(flat[:, 0] > THERE[0], RIM, LEVEL)):
-        assert find_box(known(np.zeros(2)), np.column_stack([flat, z])) is None
+        assert find_box(known(np.zeros(2)), np.column_stack([flat, z]), [THERE]) is None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import cv2
@@ -31,8 +32,8 @@ ALIKE = 0.8
 """How alike they have to be: 2 is a rim as high everywhere as it should be, around what is lower everywhere."""
 
 
-def find_box(box: OpenBox, points: Array) -> OpenBox | None:
-    """Return `box` where a view shows it, with its shape and heading; None where nothing near it is like it.
+def find_box(box: OpenBox, points: Array, around: Sequence[Array]) -> OpenBox | None:
+    """Return `box` where a view shows it, with its shape and heading; None where nothing is like it.
 
     Of all shifts and heights on a grid that one counts at which most of the rim is as high as it should be, and most of
     the inside lower (`cv2.matchTemplate`). What is not in view does not count: before a palm camera the fingers cut a
@@ -41,7 +42,14 @@ def find_box(box: OpenBox, points: Array) -> OpenBox | None:
     Args:
         box: as another camera saw it, in odom.
         points: (n, 3) of the view, in odom [m].
+        around: (2,) each, places around which its middle is looked for, in odom [m].
     """
+    alike, found = max((_find(replace(box, center=at), points) for at in around), key=lambda one: one[0])
+    return found if alike > ALIKE else None
+
+
+def _find(box: OpenBox, points: Array) -> tuple[float, OpenBox]:
+    """Return where a view shows `box`, around its middle, and how alike that is."""
     half = 0.5 * box.size
     cells, search = np.ceil(half / SQUARE).astype(int) + 1, round(SEARCHED / SQUARE)
     heights = _heights((points[:, :2] - box.center) @ box.axes, points[:, 2] - box.rim, cells + search)
@@ -51,7 +59,7 @@ def find_box(box: OpenBox, points: Array) -> OpenBox | None:
     seen = np.isfinite(heights)
     shown = [_laid_over(seen, part) for part in parts]
     away = np.hypot(*np.meshgrid(*(np.arange(-search, search + 1) * (SQUARE / SEARCHED),) * 2, indexing="ij"))
-    best, found = ALIKE, None
+    best, found = -np.inf, box
     for raised in RAISED:
         level = np.where(np.abs(heights - raised) < THICK, 1.0, np.where(heights < raised, -1.0, 0.0))
         rim, inside = (_laid_over(level, part) / np.maximum(s, HALF) for part, s in zip(parts, shown, strict=True))
@@ -61,7 +69,7 @@ def find_box(box: OpenBox, points: Array) -> OpenBox | None:
             best = float(alike[i, j])
             shift = box.axes @ ((i - search) * SQUARE, (j - search) * SQUARE)
             found = replace(box, center=box.center + shift, rim=box.rim + raised, level=box.level + raised)
-    return found
+    return best, found
 
 
 def _heights(flat: Array, z: Array, reach: NDArray[np.intp]) -> Array:
