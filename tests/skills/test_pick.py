@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any
@@ -13,6 +14,7 @@ import pytest
 from golem.capabilities.grasping.base import Grasp, GraspMethod, Gripper, OpenLoop, ServoStatus, ServoStep
 from golem.capabilities.grasping.centroid import Centroid, CentroidConfig
 from golem.capabilities.grasping.visual_servo import VisualServo
+from golem.capabilities.perception.open_box import OpenBox
 from golem.capabilities.planning.base import PlanRefused, Refusal
 from golem.errors import ConfigError
 from golem.interfaces import topics
@@ -213,14 +215,28 @@ def test_a_neighbour_is_not_taken_where_it_is_known_what_the_palm_camera_is_off_
 
 
 @pytest.mark.parametrize(
-    ("seen", "goes"), [((0.02, 0.08), (0.01, 0.04)), ((0.0, 0.05), (0.0, 0.0)), ((0.16, 0.13), (0.0, 0.0))]
+    ("seen", "off", "goes"),
+    [
+        ((0.02, 0.08), (0.02, 0.03), (0.02, 0.03)),  # one half of it: the whole is where its shape is
+        ((0.0, 0.05), (0.01, 0.02), (0.0, 0.0)),  # near enough
+        ((0.2, 0.13), (0.2, 0.13), (0.0, 0.0)),  # another one
+    ],
 )
-def test_a_hand_lets_go_where_both_cameras_say_and_leaves_out_what_is_far_off_or_near(
-    full: Any, thing: Any, seen: tuple[float, float], goes: tuple[float, float]
+def test_a_hand_lets_go_where_the_palm_camera_shows_the_shape_of_the_tray(
+    full: Any, thing: Any, monkeypatch: pytest.MonkeyPatch, seen: Array, off: Array, goes: Array
 ) -> None:
     let_go: list[Array] = []
-    tick, middle = full.step, TRAY + (*seen, 0.0)
-    full.objects["right_hand"] = lambda: [thing("screw", SCREW, full.t), thing("tray", middle, full.t, 0.15)]
+    tick, box = full.step, OpenBox(TRAY[:2], 0.0, np.array([0.14, 0.22]), float(TRAY[2]) + 0.04, float(TRAY[2]))
+
+    def find(wanted: OpenBox, points: Array, around: Sequence[Array]) -> OpenBox | None:
+        near = min(np.linalg.norm(at - TRAY[:2] - off) for at in around)
+        return replace(wanted, center=TRAY[:2] + off) if near < 0.07 else None
+
+    monkeypatch.setattr("golem.skills.pick_targets.fit_open_box", lambda _: box)
+    monkeypatch.setattr("golem.skills.pick_place.find_box", find)
+    full.objects["right_hand"] = lambda: [
+        thing("screw", SCREW, full.t), thing("tray", TRAY + (*seen, 0.0), full.t, 0.15)
+    ]  # fmt: skip
 
     def step() -> None:
         held = full.holds
@@ -231,7 +247,7 @@ def test_a_hand_lets_go_where_both_cameras_say_and_leaves_out_what_is_far_off_or
 
     full.step = step
     assert picked(full).success
-    np.testing.assert_allclose(let_go[0][:2], TRAY[:2] + goes, atol=1e-9)
+    np.testing.assert_allclose(let_go[0][:2], TRAY[:2] + goes, atol=0.002)
 
 
 @pytest.mark.parametrize("turned", [0.0, 0.5 * np.pi, -2.0])
