@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
+import numpy as np
 import pytest
 from tests.agent.fake_body import FakeBody
 
@@ -20,6 +22,14 @@ def read(folder: Path, text: str) -> Rules:
     file = folder / "rules.yaml"
     file.write_text(text)
     return load_rules(file)
+
+
+@pytest.mark.parametrize("unknown", [{"x": math.nan}, {"velocity": np.array([math.nan, 0.0])}, {"force": math.nan}])
+def test_a_motion_that_nobody_knows_is_no_allowed_one(unknown: dict[str, Any]) -> None:
+    rules = Rules(region=Region((-1.0, 2.0), (-0.5, 0.5)), speed=0.4, force=30.0)
+    known = {"x": 0.0, "y": 0.0, "velocity": np.array([0.3, 0.0]), "force": 10.0}
+    assert not rules.excess(**known)
+    assert "not known" in rules.excess(**(known | unknown))
 
 
 def test_rules_are_read(tmp_path: Path) -> None:

@@ -118,6 +118,8 @@ class Rules:
             velocity: (2,) of base_link in odom [m/s].
             force: the larger one of both hands, beyond what it was at first [N].
         """
+        if not math.isfinite(x + y + math.hypot(*velocity) + force):
+            return "Where the robot is, or how it moves, is not known."
         if self.region is not None:
             inside = self.region.holds(x, y)
             ahead = x + STOPPING * velocity[0], y + STOPPING * velocity[1]
