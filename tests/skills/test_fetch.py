@@ -62,7 +62,7 @@ class Scripted:
 def fetch(
     goal: FetchGoal, takes: Sequence[SkillResult], places: Sequence[SkillResult] = (DONE,), seen: bool = True,
     state: GripState = GripState.HOLDING, closes: GripState = GripState.EMPTY, T_odom_estimate: PlanarPose = HERE,
-    T_odom_map: PlanarPose | None = None, speed: float = 0.0,
+    T_odom_map: PlanarPose | None = None, frame: str = "odom", speed: float = 0.0,
 ) -> tuple[SkillResult, dict[str, Scripted]]:  # fmt: skip
     """Return how an errand of a robot that walks at `speed` [m/s] ended, and what was asked of which skill."""
     skills = {"take": Scripted(Take, takes), "place": Scripted(SetDown, places), "remember": Scripted(Remember, [DONE])}
@@ -70,7 +70,7 @@ def fetch(
     if seen:
         memory.observe(look(98.0))
     context = Context(Bus(), Kinematics(), 0.01, modules(skill=skills.__getitem__, memory=memory))
-    context.bus.publish(topics.MEMORY_STATUS, MemoryStatus(0.0, "odom", 100.0, 1), 0.0)
+    context.bus.publish(topics.MEMORY_STATUS, MemoryStatus(0.0, frame, 100.0, 1), 0.0)
     context.bus.publish(topics.LEG_STATUS, replace(LEGS, speed=speed), 0.0)
     context.bus.publish(topics.hand_status("left"), HandStatus(0.0, state, 0.07, 0.0, np.zeros(2)), 0.0)
     context.bus.publish(topics.BASE, BaseEstimate(0.0, np.eye(4)), 0.0)
@@ -103,13 +103,21 @@ def test_it_takes_it_where_it_is_remembered_and_sets_it_down_as_it_was_taken() -
 
 def test_hands_get_places_in_the_odom_that_they_go_by() -> None:
     drifted, T_odom_map = PlanarPose(0.2, -0.1, 0.3), PlanarPose(-0.3, 0.4, 0.5)
-    result, skills = fetch(FetchGoal("mug", (0.5, 0.1)), [TAKEN], T_odom_estimate=drifted, T_odom_map=T_odom_map)
+    result, skills = fetch(
+        FetchGoal("mug", (0.5, 0.1)), [TAKEN], T_odom_estimate=drifted, T_odom_map=T_odom_map, frame="map"
+    )
     (taken,), (placed,) = skills["take"].goals, skills["place"].goals
     there, to = (T_odom_map @ PlanarPose(x, y, 0.0) for x, y in ((0.4, 0.0), (0.5, 0.1)))
     assert result.success and result.value.looked == pytest.approx([there.x, there.y], abs=0.002)
     there, to = drifted.to(there), drifted.to(to)
     assert taken.near == pytest.approx((there.x, there.y), abs=0.002)
     assert (placed.x, placed.y) == pytest.approx((to.x, to.y))
+
+
+def test_what_is_remembered_in_a_map_is_gone_to_nowhere_before_the_map_has_a_place() -> None:
+    result, skills = fetch(FetchGoal("mug", (0.5, 0.1)), [TAKEN], frame="map")
+    assert (result.success, result.slot) == (False, "mapper") and "not known" in result.reason
+    assert not skills["take"].goals
 
 
 def test_without_a_map_what_is_remembered_is_in_the_odom_of_the_hands() -> None:

@@ -22,7 +22,7 @@ from golem.interfaces.payloads import ArmCommand, GripState, HandStatus
 from golem.skills.base import StageFailed
 from golem.skills.context import Context
 from golem.skills.fetch import STANDOFF, before, stance
-from golem.skills.place import PlaceGoal, SetDown
+from golem.skills.place import PICTURE, PlaceGoal, SetDown
 from golem.skills.planned_motion import PlannedMotion
 from golem.skills.runner import SkillRun
 from golem.skills.take import Take
@@ -263,6 +263,15 @@ def test_the_place_is_looked_at_anew_since_the_last_picture_has_the_thing_where_
         result = world.run(SetDown().run(world.context, PlaceGoal(0.4, 0.0, label=label))).result
         assert result.reason == "The head camera shows no surface at that place."
         assert bool(asked) == bool(label) and all(t >= began for t in asked)
+
+
+def test_by_an_old_picture_nothing_is_set_down(world: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    at_home(world)
+    monkeypatch.setattr(SetDown, "_holder", lambda *_: "right")
+    began = world.t
+    result = world.run(SetDown().run(world.context, PlaceGoal(0.4, 0.0, label="bowl"))).result
+    assert (result.stage, result.slot) == ("detect", "localizer") and "No new picture" in result.reason
+    assert world.t - began < PICTURE + 0.1
 
 
 def test_what_does_not_stand_where_it_was_set_down_is_not_done() -> None:

@@ -203,8 +203,13 @@ class Context:
 
     @property
     def T_odom_memory(self) -> PlanarPose:
-        """Where the frame of what is remembered is in odom of the odometry: the map's, or that of the base estimate."""
-        return self.T_odom_map if self.mapped else self.T_odom_estimate
+        """Where the frame of what is remembered is in odom of the odometry: the map's, or that of the base estimate.
+
+        Raises StageFailed: it is the map's, and nobody says where that is.
+        """
+        status = self.bus.latest(topics.MEMORY_STATUS)
+        in_map = self.mapped if status is None else status.frame == "map"
+        return self.T_odom_map if in_map else self.T_odom_estimate
 
     @property
     def joints(self) -> Array:

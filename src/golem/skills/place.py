@@ -179,13 +179,14 @@ class SetDown:
         try:
             side = self._holder(context, goal)
             self._report.side = side
-            await self._look(context, goal)
+            if not await self._look(context, goal):
+                raise StageFailed("detect", "localizer", f"No new picture of the head camera came in {PICTURE:g} s.")
             spot = self._spot(context, motion, goal, side)
             await self._carry(context, motion, goal, side, spot)
             await self._lower(context, goal, side, float(spot[2]))
             await self._release(context, motion, side)
-            await self._look(context, goal)
-            self._stands(context, goal, spot)
+            if await self._look(context, goal):
+                self._stands(context, goal, spot)
         except StageFailed as failure:
             context.say(failure.stage, str(failure), failed=True)
             timings = {"total": context.t - start}
@@ -205,11 +206,12 @@ class SetDown:
         who = "Neither hand holds" if goal.side == "either" else f"The {goal.side} hand does not hold"
         raise StageFailed("detect", "grasp_method", f"{who} anything.")
 
-    async def _look(self, context: Context, goal: PlaceGoal) -> None:
-        """Have a new picture: in that by which it was taken, the thing still stands where it was."""
-        if goal.label:
-            with context.watch("head", goal.label) as eye:
-                await eye.look(PICTURE)
+    async def _look(self, context: Context, goal: PlaceGoal) -> bool:
+        """Have a new picture: in that by which it was taken, the thing still stands where it was. False: none came."""
+        if not goal.label:
+            return True
+        with context.watch("head", goal.label) as eye:
+            return await eye.look(PICTURE) is not None
 
     def _spot(self, context: Context, motion: PlannedMotion, goal: PlaceGoal, side: Side) -> Array:
         """Return the (3,) middle of the place on its surface, in odom, after a look whether it is free."""
