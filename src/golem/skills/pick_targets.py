@@ -36,6 +36,8 @@ TALL = 0.02
 """What stands higher than this above the floor is wall [m]."""
 APART = 0.03
 """Distance between two places that are tried [m]."""
+BESIDE_MIDDLE: Array = 0.04 * np.array([(1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.0)])
+"""Places of a container of unknown shape besides its middle, for a hand that does not get there [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +91,7 @@ class Container:
         The first is the middle as the localizer tells it: of a box that the view cuts off, the shape has another one.
         """
         chosen = [self.sighting.position]
-        for place in () if self.box is None else self.box.places(margin):
+        for place in chosen[0] + BESIDE_MIDDLE if self.box is None else self.box.places(margin):
             if all(np.linalg.norm(place - one) > APART for one in chosen):
                 chosen.append(place)
         return np.array(chosen)
