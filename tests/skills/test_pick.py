@@ -150,6 +150,26 @@ def test_what_no_hand_brings_to_the_tray_is_set_back_where_it_was_taken(full: An
     assert_safe(full)
 
 
+def test_what_one_hand_brings_nowhere_is_set_back_and_the_other_hand_brings_it(
+    world: Any, thing: Any, monkeypatch: Any
+) -> None:
+    screw, tray = np.array([0.43, 0.08, -0.03]), np.array([0.5, -0.07, -0.03])
+    carry, carried = LineTravel.carry, list[Side]()
+
+    async def refused(self: LineTravel, side: Side, goals: list[Array], speed: float) -> None:
+        if not carried:
+            carried.append(side)
+            raise StageFailed("place", "planner", "The robot touches itself.")
+        await carry(self, side, goals, speed)
+        carried.append(side)
+
+    monkeypatch.setattr(LineTravel, "carry", refused)
+    result = picked(stocked(world, thing, screw=screw, tray=tray), side="either")
+    assert result.success, result
+    assert [one.outcome for one in result.value.tried] == ["failed", "picked"]
+    assert result.value.tried[0].side != result.value.tried[1].side == carried[-1]
+
+
 def test_a_hand_leans_where_it_reaches_no_place_in_the_tray_straight(full: Any, monkeypatch: Any) -> None:
     carry, leans = LineTravel.carry, list[Array]()
 

@@ -31,7 +31,7 @@ from golem.types import SIDES, Array, LocalizedObject, Side
 
 FINAL = (PickOutcome.TIGHT, PickOutcome.OUT_OF_REACH)
 """What a second try with the same hand would not change."""
-SETTLED = (*FINAL, PickOutcome.JAMMED)
+SETTLED = (*FINAL, PickOutcome.JAMMED, PickOutcome.TRAY_OUT_OF_REACH)
 """What a second look would not change either."""
 EXPECTED = (0.03, 0.03, 0.045)
 """How far along x, y, z an object may be from where a palm camera is known to show it [m]: two of a real pack are 34 mm
@@ -89,17 +89,12 @@ class Pick:
         try:
             await self._travel.begin(self._config.travel_speed)
             choice, attempt = await self._look_and_take(context, goal, timings, tried)
-            last = self._report.tried[-1]
-            seen = np.array([last.x, last.y, last.z]) if self._seen is None else self._seen
-            await place(context, self._config, self._travel, attempt, seen, choice, self._off)
-            self._report.outcome = last.outcome = PickOutcome.PICKED.value
+            self._report.outcome = self._report.tried[-1].outcome = PickOutcome.PICKED.value
         except StageFailed as failure:
             context.say(failure.stage, str(failure), failed=True)
             self._note(failure)
             result = SkillResult(False, failure.stage, failure.slot, str(failure), timings)
             for side in _hands(goal, tried):
-                if self._from is not None and context.hands[side].status.holding:
-                    await set_back(context, self._config, self._travel, side, *self._from)
                 context.hands[side].open(self._config.release_gap)
         timings["total"] = context.t - timings.pop("start")
         for side in _hands(goal, tried):
@@ -133,14 +128,14 @@ class Pick:
     async def _look_and_take(
         self, context: Context, goal: PickGoal, timings: dict[str, float], tried: list[Attempt]
     ) -> tuple[PickChoice, Attempt]:
-        """Take the first object that comes out of what the head camera shows; `tried` gets all that were approached.
+        """Take and bring the first object that comes of what the head camera shows; `tried` gets what was approached.
 
         What the palm camera lost or the fingers missed may be found from a second look, since a base that stands moves
         a little. What is tight or out of reach stays so, and is left out.
         """
         choice = await self._look(context, goal)
         try:
-            return choice, await self._take_one(context, choice.attempts, timings, tried)
+            return choice, await self._take_one(context, choice, choice.attempts, timings, tried)
         except StageFailed as failure:
             if not self._looks_again or context.t - timings["start"] > self._config.look_again:
                 raise
@@ -154,7 +149,7 @@ class Pick:
             left = [a for a in choice.attempts if not self._is_settled(a)]
             if not left:
                 raise
-            return choice, await self._take_one(context, left, timings, tried)
+            return choice, await self._take_one(context, choice, left, timings, tried)
 
     def _is_settled(self, attempt: Attempt) -> bool:
         """Return whether the hand has tried an object there, and another try would not change how it ended."""
@@ -169,12 +164,14 @@ class Pick:
         return choice
 
     async def _take_one(
-        self, context: Context, attempts: list[Attempt], timings: dict[str, float], tried: list[Attempt]
-    ) -> Attempt:
-        """Take the first object that comes out; `tried` gets each one that was approached.
+        self, context: Context, choice: PickChoice, attempts: list[Attempt], timings: dict[str, float],
+        tried: list[Attempt],
+    ) -> Attempt:  # fmt: skip
+        """Take the first object that comes out, and bring it; `tried` gets each one that was approached.
 
-        A screw that is tight or jammed is left for the next one. An open-loop method has no next one: the error that
-        made it miss, that of the head camera, is the same everywhere.
+        A screw that is tight or jammed, or that this hand brings nowhere, is left for the next one, or for the other
+        hand. An open-loop method has no next one: the error that made it miss, that of the head camera, is the same
+        everywhere.
         """
         left = list(attempts)
         while True:
@@ -185,15 +182,24 @@ class Pick:
                 grasp = await self._approach(context, attempt)
                 await self._learn(context, attempt)
                 await self._take(context, attempt, grasp, timings)
+                await place(context, self._config, self._travel, attempt, self._held_at, choice, self._off)
                 return attempt
             except StageFailed as failure:
+                self._note(failure)
+                if self._from is not None and context.hands[attempt.side].status.holding:
+                    await set_back(context, self._config, self._travel, attempt.side, *self._from)
                 refused = failure.stage == "approach"
                 if not left or not (refused or self._looks_again):
                     raise
-                self._note(failure)
                 context.say(failure.stage, f"{failure} Leaving it for the next {attempt.label}.")
                 if left[0].side != attempt.side and context.arms[attempt.side].sent:
                     await self._travel.home(attempt.side, self._config.travel_speed)
+
+    @property
+    def _held_at(self) -> Array:
+        """Return (3,) where the palm camera saw what the hand holds, in odom [m]."""
+        last = self._report.tried[-1]
+        return np.array([last.x, last.y, last.z]) if self._seen is None else self._seen
 
     async def _approach(self, context: Context, attempt: Attempt) -> Grasp:
         """Bring the open hand over the object, turned as it can be: first across, where else a finger has no room."""
