@@ -48,6 +48,10 @@ def test_a_margin_that_is_the_true_difference_is_refuted_in_at_most_5_percent() 
     assert equal_within(draws(0.7, 4), draws(0.6, 5), 0.1)[:, -1].mean() <= 0.05
 
 
+def test_far_beyond_a_margin_is_not_equal() -> None:
+    assert not equal_within(draws(0.9, 4), draws(0.5, 5), 0.02).any()
+
+
 def test_the_stakes_of_a_fixed_number_keep_their_coverage_too() -> None:
     values = np.random.default_rng(6).beta(0.3, 0.3, (STUDIES, 30))
     refuted = log_capital(values, [0.5], n=30)[..., 0].max(axis=-1) >= math.log(20.0)

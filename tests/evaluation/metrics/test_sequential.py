@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from golem.evaluation.metrics.anytime import anytime_p, paired_evidence, unpaired_evidence
-from golem.evaluation.metrics.sequential import Pair, StopRule, decisions, pair_of
+from golem.evaluation.metrics.sequential import Pair, StopRule, decisions, pair_of, sequential_tables
 from golem.types import Array
 
 
@@ -49,3 +49,16 @@ def test_scores_are_compared_by_their_mean_difference() -> None:
 
 def test_what_has_no_trial_in_common_is_no_pair() -> None:
     assert pair_of("a", records(np.ones(3), 1), "b", {}, StopRule()) is None
+
+
+@pytest.mark.parametrize("margin", [0.05, 0.1, 0.15, 0.2])
+def test_what_ends_as_equal_is_called_equal(margin: float) -> None:
+    """The run ends with the trial that refutes the last of both margins: the interval then ends just there."""
+    rule, rng = StopRule(margin), np.random.default_rng(0)
+    for _ in range(20):
+        a, b = (rng.random((2, 3000)) < 0.95).astype(float)
+        ended = rule.decided_after(a, b)
+        assert ended is not None
+        found = decisions([("a", "b", a[:ended], b[:ended], True)], rule)
+        verdict = sequential_tables({}, found, rule)[-1].rows[0][-1]
+        assert verdict.endswith(f"{'is better' if found[0].p <= 0.05 else 'equal'}, known after {ended}")

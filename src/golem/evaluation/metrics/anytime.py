@@ -41,12 +41,17 @@ def log_capital(values: ArrayLike, means: ArrayLike, alpha: float = ALPHA, n: in
     Returns:
         (..., T, G); a mean is refuted at level alpha once it exceeds log(1 / alpha).
     """
+    return np.maximum(*_wagers(values, means, alpha, n))
+
+
+def _wagers(values: ArrayLike, means: ArrayLike, alpha: float, n: int | None = None) -> tuple[Array, Array]:
+    """Return `log_capital` of each wager alone: that the mean is above each of `means`, and that it is below."""
     x, m = np.asarray(values, np.float64), np.asarray(means, np.float64)
     stake, gain = _stakes(x, alpha, n)[..., None], x[..., None] - m
     with np.errstate(divide="ignore"):
         up, down = np.minimum(stake, STAKE / m), np.minimum(stake, STAKE / (1.0 - m))
-    won = np.maximum(np.cumsum(np.log1p(up * gain), axis=-2), np.cumsum(np.log1p(-down * gain), axis=-2))
-    return won - math.log(2.0)
+    above, below = (np.cumsum(np.log1p(bet * gain), axis=-2) - math.log(2.0) for bet in (up, -down))
+    return above, below
 
 
 def confidence_sequence(values: ArrayLike, alpha: float = ALPHA, n: int | None = None) -> tuple[Array, Array]:
@@ -126,9 +131,10 @@ def anytime_p(log_evidence: Array) -> Array:
 def equal_within(a: ArrayLike, b: ArrayLike, margin: float, alpha: float = ALPHA) -> NDArray[np.bool_]:
     """Return after each of (..., T) pairs whether a difference of `margin` or more, either way, is refuted."""
     values = (1.0 + np.asarray(a, np.float64) - np.asarray(b, np.float64)) / 2.0
-    capital = log_capital(values, [(1.0 - margin) / 2.0, (1.0 + margin) / 2.0], alpha)
-    refuted = np.maximum.accumulate(capital, axis=-2) >= math.log(1.0 / alpha)
-    return refuted[..., 0] & refuted[..., 1]
+    above, below = _wagers(values, [(1.0 - margin) / 2.0, (1.0 + margin) / 2.0], alpha)
+    # What lies beyond one end refutes both, and is no equality: each end counts from its inner side.
+    worst = np.minimum(*(np.maximum.accumulate(x, axis=-1) for x in (above[..., 0], below[..., 1])))
+    return worst >= math.log(1.0 / alpha)
 
 
 def _is_binary(x: Array) -> bool:

@@ -92,6 +92,7 @@ class Decision:
         p: p-value that holds at any time.
         p_holm: the same, adjusted for all comparisons.
         after: pairs after which it was decided; None if it is not.
+        equal: whether the rule refutes a difference of its margin or more; the interval has no more than its grid.
     """
 
     a: str
@@ -101,6 +102,7 @@ class Decision:
     p: float
     p_holm: float
     after: int | None
+    equal: bool
 
 
 Pair = tuple[str, str, Array, Array, bool]
@@ -111,11 +113,14 @@ both saw the same scenes."""
 def decisions(pairs: Sequence[Pair], rule: StopRule) -> tuple[Decision, ...]:
     """Return what is known of each pair, with Holm's adjustment over all, and over those of the rule still to come."""
     ps = [float(anytime_p(evidence(a, b, paired))[-1]) for *_, a, b, paired in pairs]
-    adjusted_ps = holm([*ps, *[1.0] * (rule.comparisons - len(ps))])
+    alpha, adjusted = anytime.ALPHA / rule.comparisons, holm([*ps, *[1.0] * (rule.comparisons - len(ps))])
     return tuple(
-        Decision(one, other, len(a), difference_interval(a, b), p, adjusted, rule.decided_after(a, b, paired=paired))
-        for (one, other, a, b, paired), p, adjusted in zip(pairs, ps, adjusted_ps, strict=False)
-    )
+        Decision(
+            one, other, len(a), difference_interval(a, b), p, p_holm, rule.decided_after(a, b, paired=paired),
+            bool(equal_within(a, b, rule.margin, alpha)[-1]),
+        )
+        for (one, other, a, b, paired), p, p_holm in zip(pairs, ps, adjusted, strict=False)
+    )  # fmt: skip
 
 
 def pairs_of(records: Sequence[TrialRecord], methods: Sequence[str], rule: StopRule) -> list[Pair]:
@@ -189,7 +194,7 @@ def _fixed(x: Array) -> Interval:
 def _verdict(d: Decision, rule: StopRule) -> str:
     if d.p_holm <= anytime.ALPHA:
         verdict = f"{'first' if d.difference.low + d.difference.high > 0.0 else 'second'} is better"
-    elif -rule.margin <= d.difference.low and d.difference.high <= rule.margin:
+    elif d.equal or max(-d.difference.low, d.difference.high) <= rule.margin + 1e-9:
         verdict = "equal"
     else:
         return "open"
