@@ -19,7 +19,7 @@ from golem.evaluation.harness.records import Provenance, read_records
 from golem.evaluation.metrics.anytime import anytime_interval
 from golem.evaluation.metrics.sequential import StopRule
 from golem.evaluation.metrics.statistics import wilson
-from golem.evaluation.report.site import PublishConfig, run_publish
+from golem.evaluation.report.site import PublishConfig, _data, run_publish
 from golem.evaluation.study.study_command import StudyConfig, run_study_command, simulated, smallest_difference
 from golem.evaluation.study.study_file import read_study_file
 from golem.evaluation.study.study_folder import CellResult, Study, read_study
@@ -200,6 +200,17 @@ def test_the_share_of_a_search_is_not_quoted(fake: Callable[..., LadderConfig], 
     study = Study("few", "Few", "", "", "", "never", StopRule(), (), (cell,))
     assert study.rates().rows == (("levels", "own table"),)
     assert study.pairs() == [] and study.comparisons() == []
+
+
+def test_the_data_of_a_site_hold_reasons_of_several_lines(fake: object, tmp_path: Path) -> None:
+    """Arrow reads a megabyte at once, which ends within a trial."""
+    parquet = pytest.importorskip("pyarrow.parquet")
+    lost = TrialOutcome(False, "fault", detail="It said:\n" + 700 * "no. ")
+    p = Provenance({"good": {}}, {}, "abc", {})
+    records = tuple(p.record(TrialSpec("fake", "good", "ideal", 0, i), lost) for i in range(500))
+    study = Study("few", "Few", "", "", "", "never", StopRule(), (), (CellResult("a", tmp_path, 500, records),))
+    _data([study], tmp_path)
+    assert parquet.read_table(tmp_path / "data" / "trials.parquet")["detail"].to_pylist() == [lost.detail] * 500
 
 
 def test_what_shares_a_scene_counts_as_one(fake: Callable[..., LadderConfig], tmp_path: Path) -> None:

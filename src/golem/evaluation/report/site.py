@@ -188,7 +188,9 @@ def _data(studies: Sequence[Study], out: Path) -> dict[str, str]:
     try:
         from pyarrow import csv, parquet  # pyright: ignore[reportMissingImports]
 
-        parquet.write_table(csv.read_csv(io.BytesIO(text.encode())), out / "data" / "trials.parquet")
+        lines = csv.ParseOptions(newlines_in_values=True)  # a module's reason may have several
+        table = csv.read_csv(io.BytesIO(text.encode()), parse_options=lines)
+        parquet.write_table(table, out / "data" / "trials.parquet")
         files["trials.parquet"] = "data/trials.parquet"
     except ImportError:
         print("The site has no Parquet file: pyarrow is not installed; pip install pyarrow.")
