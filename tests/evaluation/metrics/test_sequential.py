@@ -14,7 +14,7 @@ from golem.types import Array
 
 
 def records(successes: Array, seed: int) -> dict[int, Any]:
-    return {i: SimpleNamespace(index=i, seed=seed, success=bool(s), series={}) for i, s in enumerate(successes)}
+    return {i: [SimpleNamespace(index=i, seed=seed, success=bool(s), series={})] for i, s in enumerate(successes)}
 
 
 @pytest.fixture

@@ -228,6 +228,20 @@ def test_what_shares_a_scene_counts_as_one(fake: Callable[..., LadderConfig], tm
     assert early == anytime_interval([1.0] * 20)
 
 
+def test_cells_of_several_cases_are_compared_over_all_of_them(fake: object, tmp_path: Path) -> None:
+    def cell(name: str, lost: str, cases: tuple[str, ...]) -> CellResult:
+        p = Provenance({"good": {}}, {}, "abc", {})
+        outcomes = {case: TrialOutcome(False, "fall") if case == lost else TrialOutcome(True, "done") for case in cases}
+        specs = [TrialSpec("fake", "good", "ideal", 0, i, case={"on": case}) for i in range(20) for case in cases]
+        return CellResult(name, tmp_path, 20, tuple(p.record(spec, outcomes[str(spec.case["on"])]) for spec in specs))
+
+    cells = cell("a", "ice", ("ice", "floor")), cell("b", "", ("mud", "ice", "floor")), cell("c", "mud", ("mud",))
+    study = Study("few", "Few", "", "", "", "never", StopRule(), (("a", "b"), ("a", "c")), cells)
+    both, other = ((x.tolist(), y.tolist()) for *_, x, y, _ in study.pairs())
+    assert both == ([0.5] * 20, [1.0] * 20)  # on ice and floor, which both have
+    assert other == ([0.5] * 20, [0.0] * 20)
+
+
 @pytest.mark.parametrize(
     "change",
     [

@@ -14,6 +14,7 @@ from golem.evaluation.harness.records import TrialRecord
 from golem.evaluation.metrics import anytime
 from golem.evaluation.metrics.anytime import anytime_interval, anytime_p, difference_interval, equal_within, evidence
 from golem.evaluation.metrics.statistics import Interval, holm, wilson
+from golem.evaluation.metrics.summary import by_scene
 from golem.evaluation.metrics.tables import p_value
 from golem.evaluation.metrics.text_table import TextTable, short_names
 from golem.types import Array
@@ -128,7 +129,7 @@ def pairs_of(records: Sequence[TrialRecord], methods: Sequence[str], rule: StopR
     cases: dict[str, Case] = {case_name(r.case): r.case for r in records}
     found: list[Pair] = []
     for case in cases:
-        sides = {m: {r.index: r for r in records if r.method == m and case_name(r.case) == case} for m in methods}
+        sides = {m: by_scene([r for r in records if r.method == m and case_name(r.case) == case]) for m in methods}
         for a, b in itertools.combinations(methods, 2):
             pair = pair_of(f"{a}, {case}" if case else a, sides[a], f"{b}, {case}" if case else b, sides[b], rule)
             found += [pair] if pair else []
@@ -136,17 +137,18 @@ def pairs_of(records: Sequence[TrialRecord], methods: Sequence[str], rule: StopR
 
 
 def pair_of(
-    one: str, a: Mapping[int, TrialRecord], other: str, b: Mapping[int, TrialRecord], rule: StopRule
+    one: str, a: Mapping[int, Sequence[TrialRecord]], other: str, b: Mapping[int, Sequence[TrialRecord]], rule: StopRule
 ) -> Pair | None:
-    """Return the trials of two sides by the indices they have in common; None where there is none.
+    """Return the scenes of two sides by the indices they have in common, each as the mean of its trials; None: no such.
 
     Of another seed the scenes are others, too.
     """
     both = sorted(a.keys() & b.keys())
     if not both:
         return None
-    paired = all(a[i].seed == b[i].seed for i in both)
-    return one, other, rule.values([a[i] for i in both]), rule.values([b[i] for i in both]), paired
+    paired = all(a[i][0].seed == b[i][0].seed for i in both)
+    x, y = (np.array([rule.values(side[i]).mean() for i in both]) for side in (a, b))
+    return one, other, x, y, paired
 
 
 def sequential_tables(rates: Mapping[str, Array], found: Sequence[Decision], rule: StopRule) -> list[TextTable]:

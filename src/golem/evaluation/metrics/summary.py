@@ -202,17 +202,21 @@ def _common(a: Sequence[TrialRecord], b: Sequence[TrialRecord]) -> tuple[list[Tr
     return one, other
 
 
+def by_scene(records: Sequence[TrialRecord]) -> dict[int, list[TrialRecord]]:
+    """Return index -> its records, one per case: trials of one index share a scene."""
+    found: dict[int, list[TrialRecord]] = {}
+    for record in records:
+        found.setdefault(record.index, []).append(record)
+    return found
+
+
 def pooled(method: str, records: Sequence[TrialRecord]) -> Pooled | None:
     """Return how often `method` succeeded under all cases together; None where it has no trial."""
-    scenes: dict[int, list[bool]] = {}
-    for record in records:
-        if record.method == method:
-            scenes.setdefault(record.index, []).append(record.success)
-    if not scenes:
+    own = [record for record in records if record.method == method]
+    if not own:
         return None
-    won = [sum(scene) for scene in scenes.values()]
-    n = sum(map(len, scenes.values()))
-    return Pooled(method, n, sum(won), len(scenes), stats.clustered(list(scenes.values())))
+    scenes = [[record.success for record in scene] for scene in by_scene(own).values()]
+    return Pooled(method, len(own), sum(map(sum, scenes)), len(scenes), stats.clustered(scenes))
 
 
 def comparisons_of(pairs: Sequence[tuple[Sequence[TrialRecord], Sequence[TrialRecord]]]) -> tuple[Comparison, ...]:

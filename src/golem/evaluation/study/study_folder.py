@@ -17,6 +17,7 @@ from golem.evaluation.metrics.anytime import anytime_interval
 from golem.evaluation.metrics.published import PAPER
 from golem.evaluation.metrics.sequential import Pair, StopRule, decisions, pair_of, pairs_of, sequential_tables
 from golem.evaluation.metrics.statistics import Interval, clustered, wilson
+from golem.evaluation.metrics.summary import by_scene
 from golem.evaluation.metrics.text_table import TextTable, short_names
 
 FACTS = "study.json"
@@ -117,9 +118,7 @@ class Study:
 
     def success(self, cell: CellResult, method: str) -> tuple[float, Interval]:
         """Return the rate of a method that has trials, with its interval: what shares a scene counts as one."""
-        scenes: dict[int, list[bool]] = {}
-        for r in cell.of(method):
-            scenes.setdefault(r.index, []).append(r.success)
+        scenes = {index: [r.success for r in rows] for index, rows in by_scene(cell.of(method)).items()}
         rate = sum(map(sum, scenes.values())) / sum(map(len, scenes.values()))
         if self.stop == "decided":
             return rate, anytime_interval([sum(one) / len(one) for one in scenes.values()])
@@ -136,8 +135,10 @@ class Study:
         for one, other in self.compare:
             if one in by_name and other in by_name:
                 for method in by_name[one].methods:
-                    sides = ({r.index: r for r in by_name[name].of(method)} for name in (one, other))
-                    pair = pair_of(f"{method}: {one}", next(sides), other, next(sides), self.rule)
+                    a, b = by_name[one].of(method), by_name[other].of(method)
+                    if both := {r.key for r in a} & {r.key for r in b}:  # else each cell has a case of its own
+                        a, b = ([r for r in side if r.key in both] for side in (a, b))
+                    pair = pair_of(f"{method}: {one}", by_scene(a), other, by_scene(b), self.rule)
                     found += [pair] if pair else []
         return found
 
