@@ -3,6 +3,7 @@ from __future__ import annotations
 import errno
 import json
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from golem.datasets.commands import findings as check
 from golem.datasets.episode_writer import DatasetWriter
 from golem.datasets.schema import DatasetError, Recipe
 from golem.datasets.store import DatasetFolder
-from golem.errors import GolemError, OutputError
+from golem.errors import ConfigError, GolemError, OutputError
 
 pq = pytest.importorskip("pyarrow.parquet")
 
@@ -69,6 +70,15 @@ def test_a_data_set_goes_on(dataset: Path) -> None:
 def test_one_that_was_recorded_otherwise_does_not(dataset: Path) -> None:
     with pytest.raises(DatasetError, match="recorded otherwise"):
         DatasetWriter(dataset, PLAIN)
+
+
+def test_masks_of_other_labels_do_not_go_on_and_are_not_merged(dataset: Path, tmp_path: Path) -> None:
+    other = replace(SMALL, masks=("tray", "screw"))  # its screws are 2, and not 1
+    with pytest.raises(DatasetError, match="has --masks screw,"):
+        DatasetWriter(dataset, other)
+    DatasetWriter(dataset, SMALL).close()
+    with pytest.raises(ConfigError, match="of 'screw', those of .* of 'tray screw'"):
+        commands.merge(tmp_path / "all", (dataset, write(tmp_path / "other", (3,), other)))
 
 
 def test_two_writers_are_one_too_many(dataset: Path) -> None:

@@ -327,6 +327,9 @@ def merge(dataset: Positional[Path], sources: Positional[tuple[Path, ...]]) -> N
     for other in data[1:]:
         if (other.fps, other.info["features"]) != (data[0].fps, data[0].info["features"]):
             raise ConfigError(f"{other.root} has other features or another rate than {data[0].root}.")
+        if other.labels != data[0].labels:
+            one, two = (" ".join(each.labels) for each in (data[0], other))
+            raise ConfigError(f"The masks of {data[0].root} are of '{one}', those of {other.root} of '{two}'.")
     episodes = [draft for each in data for draft in drafts(each)]
     rewritten(data[0], dataset, episodes)
     print(f"{len(episodes)} episodes in {dataset}.")

@@ -123,6 +123,9 @@ class DatasetWriter:
                         f"The data set {root} was recorded otherwise ({there.fps} fps; {', '.join(there.features)}), "
                         "and an episode like this does not fit; give another folder."
                     )
+                if there.labels != list(recipe.masks):
+                    said = " ".join(there.labels)
+                    raise DatasetError(f"The data set {root} has --masks {said}, in this order; give another folder.")
                 self.episodes = len(there.episodes)
             self._exit = held_.pop_all()
 

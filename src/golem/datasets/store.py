@@ -52,6 +52,7 @@ class DatasetFolder:
     Attributes:
         info, about: what info.json and golem.json say; the second is empty in a data set of others.
         features: by name; `videos` are those that are in videos.
+        labels: of the masks, whose numbers are their places here from 1 on.
         tasks, episodes: in their order.
     """
 
@@ -91,6 +92,7 @@ class DatasetFolder:
         except (*DAMAGE, arrow) as error:
             raise DatasetError(f"The metadata of the data set {root} is damaged: {error!r}.") from error
         self.about = _read_json(root, ABOUT) if (root / ABOUT).exists() else {}
+        self.labels: list[Any] = self.about.get("masks") or []
         found, said = len(self.episodes), self.info.get("total_episodes")
         frames, told = sum(episode.length for episode in self.episodes), self.info.get("total_frames")
         if not frames:
