@@ -6,10 +6,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from tests.evaluation.blame.blamed_rung import Blamed
 
 from golem.cli import main
 from golem.errors import ConfigError, GolemError, OutputError
 from golem.evaluation import base
+from golem.evaluation.base import TrialOutcome, TrialSpec
 from golem.evaluation.blame.blame_command import BlameConfig, run_blame
 from golem.evaluation.harness.ladder import LadderConfig, run_ladder
 
@@ -91,6 +93,22 @@ def test_an_exchange_that_harms_is_charged_for_it(run: Path) -> None:
     one = json.loads((run / "blame" / "blame.json").read_text())[0]
     # `hand` wins nothing, so that its harm is not even looked at; with everything exchanged it costs.
     assert one["singles"]["hand"][1] == -1 and "hand" not in one["shares"]
+
+
+def test_harm_is_counted_among_the_trials_that_are_asked_for(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Blamed, "run", harmful)
+    shutil.rmtree(run / "blame")
+    for harm, lost in ((100, 10), (6, 2)):  # the second finds the trials of the first, and asks for every fifth
+        run_blame(BlameConfig((run,), only=("arms",), harm=harm))
+        one = json.loads((run / "blame" / "blame.json").read_text())[0]
+        assert one["singles"]["arms"][1] == lost, harm
+
+
+def harmful(self: Blamed, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
+    """Arms win what they lost, and lose the third of six trials."""
+    if spec.index % 6 == 2 if spec.overrides else spec.index % 6 < 2:
+        return TrialOutcome(False, "reach", "upper_body: diff_ik")
+    return TrialOutcome(True, "done")
 
 
 def test_a_budget_names_every_rung(run: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -219,7 +219,7 @@ def judge(trials: Trials, method: str, names: Sequence[str], config: BlameConfig
     singles: dict[str, tuple[int, int, Points]] = {}
     for name in names:
         who, nothing = frozenset([name]), points(replace(strata, won_run=()), dict.fromkeys(again, 0.0), len(names))
-        losses = sum(not trials.won[who].get(key, True) for key in won) if name in matter else -1
+        losses = sum(not trials.won[who][key] for key in harmed) if name in matter else -1
         singles[name] = len(alone[name]), losses, effect(who, len(names)) if name in matter else nothing
     each = {key: shapley(orders, lambda who, key=key: float(trials.won[who][key])) for key in keys}
     shares = {name: points(strata, {key: each[key][name] for key in keys}) for name in matter}
