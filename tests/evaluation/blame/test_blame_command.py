@@ -111,6 +111,13 @@ def harmful(self: Blamed, spec: TrialSpec, artefacts: Path | None) -> TrialOutco
     return TrialOutcome(True, "done")
 
 
+def test_a_method_that_has_changed_since_is_refused(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As a file of the user's that was mended after its ladder: the lost trials are no longer its own."""
+    monkeypatch.setattr(Blamed, "config", lambda self, method, *_: {"file": "mended"} if method == "both" else {})
+    with pytest.raises(ConfigError, match="both has changed since"):
+        run_blame(BlameConfig((run,)))
+
+
 def test_a_budget_names_every_rung(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     run_blame(BlameConfig((run, run), n=60))
     assert "Error budget" in capsys.readouterr().out

@@ -130,6 +130,9 @@ class Trials:
             raise ConfigError(f"Rung {request.rung.name} searches levels; golem blame takes rungs with fixed trials.")
         if (first.code, dict(first.versions)) != (now.code, dict(now.versions)):
             raise ConfigError(f"{run} was run by other code or packages, commit {first.commit}; run its ladder again.")
+        changed = next((r.method for r in records if r.config != now.configs[r.method]), None)
+        if changed is not None:
+            raise ConfigError(f"{changed} has changed since {run} was run, or a file of it; run its ladder again.")
 
     def _prepare(self, exchanged: Coalition) -> tuple[Request, Provenance]:
         if exchanged not in self._asked:
