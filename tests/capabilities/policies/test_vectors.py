@@ -144,6 +144,26 @@ def test_live_nobody_waits_and_who_is_late_is_given_up() -> None:
     stream.close()
 
 
+def test_a_base_stops_while_the_answer_is_late_and_hands_stay_where_they_are_sent() -> None:
+    import threading
+
+    go = threading.Event()
+
+    class Walking(Counting):
+        def infer(self, observation: Any) -> Any:
+            if self.asked:
+                go.wait(5.0)
+            return super().infer(observation) + 0.3 * (np.arange(25) == list(ACTION).index("base.vx"))
+
+    stream = ActionStream(Walking(8), PolicyLinkConfig(fps=10, n_action_steps=8, latency=0.0))
+    assert stream.step(0.0, lambda: {}, live=False) is not None
+    walked = {t: stream.step(t, lambda: {}, live=True) for t in (0.8, 1.2, 1.4, 4.0)}  # asked at 0.8, never answered
+    go.set()
+    stream.close()
+    assert [x[21] for x in walked.values() if x is not None] == [0.3, 0.3, 0.0, 0.0]
+    assert [x[1] for x in walked.values() if x is not None] == [7.0] * 4
+
+
 @pytest.mark.parametrize("size", [(320, 240), (160, 120), (224, 168)])
 def test_a_smaller_depth_is_where_its_colour_is(size: tuple[int, int]) -> None:
     """Colour is a mean over what becomes one pixel, so depth is from its middle, and none is made up."""

@@ -13,11 +13,13 @@ import numpy as np
 
 from golem.capabilities.policies.onnx_policy import OnnxPolicy
 from golem.capabilities.policies.openpi import PolicyLinkConfig, PolicyServer
-from golem.capabilities.policies.vectors import ActionRefused, check_actions
+from golem.capabilities.policies.vectors import TWIST, ActionRefused, check_actions
 from golem.errors import ServiceUnavailable
 from golem.types import Array
 
 C = TypeVar("C", bound=PolicyLinkConfig)
+DRIVEN = 0.5
+"""Time for which the base goes on without an answer [s]: as long as legs follow a twist that nobody repeats."""
 
 
 class ActionPolicy(Protocol):
@@ -52,7 +54,8 @@ class ActionStream:
     """Asks a policy on a thread of its own, and says which action is due.
 
     On the clock the answer to an observation of time t counts from t + latency on, whatever the machine needed; live it
-    counts when it comes. Its i-th action is for t + i / fps: those that are over by then are left out.
+    counts when it comes. Its i-th action is for t + i / fps: those that are over by then are left out. The last of a
+    chunk stays, its twist only until the next answer is late.
     """
 
     def __init__(self, policy: ActionPolicy, config: PolicyLinkConfig, prompt: str = "") -> None:
@@ -90,7 +93,13 @@ class ActionStream:
                 self._job = self._pool.submit(self._policy.infer, {**seen, "prompt": self._prompt}), t
                 if not live and c.latency == 0.0:
                     return self.step(t, observe, live)
-        return None if self._chunk is None else self._chunk[min(max(index, 0), len(self._chunk) - 1)]
+        if self._chunk is None:
+            return None
+        action = self._chunk[min(max(index, 0), len(self._chunk) - 1)].copy()
+        waited = math.inf if self._job is None else t - self._job[1]
+        if index >= len(self._chunk) and waited > max(c.latency, DRIVEN):
+            action[TWIST] = 0.0
+        return action
 
     def close(self) -> None:
         """Ask no more."""
