@@ -90,6 +90,8 @@ def test_an_episode_ends_with_its_time_and_repeats_itself() -> None:
     for a, b in zip(*runs, strict=True):
         assert all(np.array_equal(a[name], b[name]) for name in a)
     assert runs[0][-1]["palms"][11] < runs[0][0]["palms"][11] - 0.005
+    # The last observation is what the last action led to.
+    assert not np.array_equal(runs[0][-1]["q"], runs[0][-2]["q"])
     env.reset(seed=3)
     for wrong in (np.zeros(3), np.full(len(ACTIONS), np.nan)):
         with pytest.raises(ConfigError, match="finite numbers"):

@@ -175,7 +175,10 @@ class GolemEnv(gym.Env[dict[str, Any], Any]):
             errand = _Errand(self, told, seen, done)
 
             def execute(skill: object, goal: object, *given: Any, **named: Any) -> Any:
-                return LockstepRunner.execute(running, errand, goal, *given, **named)
+                result = LockstepRunner.execute(running, errand, goal, *given, **named)
+                if errand.observer is not None and errand.observer.look() is not None:
+                    self._last = errand.frame()  # what the last action led to, also where it ended the trial
+                return result
 
             running.execute = execute
 
@@ -199,15 +202,17 @@ class _Errand:
     def __init__(self, env: GolemEnv, told: Line, seen: Line, done: Callable[[], Any]) -> None:
         self._env, self._told, self._seen, self._done = env, told, seen, done
         self._gaps: list[float] = [np.inf, np.inf]
+        self.observer: Observer | None = None
 
     async def run(self, context: Context, goal: object) -> SkillResult:
         """Ask, and do, until the errand is done or its time is over; see `Routine`."""
-        env, observer = self._env, Observer(context.bus, self._env.cameras, self._env.width)
+        env = self._env
+        self.observer = observer = Observer(context.bus, env.cameras, env.width)
         await context.until(lambda: observer.look() is not None, 5.0)
         end = context.t + env.limit - 1e-6
         self._goals = {side: context.arms[side].pose for side in SIDES}
         while not self._done() and context.t < end:
-            self._seen.put((self._frame(observer), None, None))
+            self._seen.put((self.frame(), None, None))
             action = self._told.get()
             if action is None:
                 raise _Over
@@ -217,8 +222,10 @@ class _Errand:
         env.late = context.t >= end
         return SkillResult(True, "done", None, "The agent's time is over." if env.late else "The agent is done.")
 
-    def _frame(self, observer: Observer) -> dict[str, Any]:
-        out, seen = {}, observer.observation() or {}
+    def frame(self) -> dict[str, Any]:
+        """Return the observation of this moment."""
+        assert self.observer is not None
+        out, seen = {}, self.observer.observation() or {}
         for name, (part, bound) in PARTS.items():
             out[name] = np.clip(seen["observation.state"][part], -bound, bound)
         return out | {f"image_{name}": seen[f"observation.images.{name}"] for name in self._env.cameras}
