@@ -1,7 +1,8 @@
-"""What the live view costs beside a standing robot: `python scripts/live_view_minutes.py 30`.
+"""What the live view costs beside a standing robot: `python scripts/live_view_minutes.py 30 [chromium]`.
 
-A client that speaks the browser's protocol looks on for so many minutes, then nobody does for three. Printed are the
-CPU time per robot second of both, and the memory of the process at the beginning and at the end.
+A client that speaks the browser's protocol, or a browser of that family without a window, looks on for so many minutes,
+then nobody does for three. Printed are the CPU time per robot second of both, and the memory of the process at the
+beginning and at the end, and that of all processes of the browser.
 """
 
 from __future__ import annotations
@@ -11,6 +12,8 @@ import os
 import re
 import subprocess
 import sys
+import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 import msgspec
@@ -49,13 +52,38 @@ async def look(pid: int, seconds: float) -> list[tuple[float, float, float]]:
     return found
 
 
-async def main(minutes: float) -> None:
+def tree(pid: int) -> list[int]:
+    """Return the ids of a process and of all that it began."""
+    children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+    return [pid, *(each for child in children for each in tree(int(child)))]
+
+
+async def browse(robot: int, seconds: float, browser: str) -> list[tuple[float, float, float]]:
+    """Keep the page open in a browser; return what `look` returns."""
+    size = ("--window-size=640,400", "--enable-unsafe-swiftshader")
+    with tempfile.TemporaryDirectory() as profile:
+        args = [browser, "--headless=new", "--no-sandbox", *size, f"--user-data-dir={profile}"]
+        page = subprocess.Popen([*args, f"http://127.0.0.1:{PORT}"], stderr=subprocess.DEVNULL)
+        await asyncio.sleep(60.0)
+        first = (await look(robot, 1.0))[0]
+        mb = [sum(used(pid)[1] for pid in tree(page.pid))]
+        await asyncio.sleep(seconds)
+        mb.append(sum(used(pid)[1] for pid in tree(page.pid)))
+        last = (await look(robot, 1.0))[0]
+        page.terminate()
+        page.wait()
+    print(f"{browser}: {mb[0]:.0f} to {mb[1]:.0f} MB, of all its processes")
+    return [first, last]
+
+
+async def main(minutes: float, browser: Sequence[str]) -> None:
     """Print the two costs."""
     robot = subprocess.Popen(["golem", "run", "stand", "--port", str(PORT)], stdout=subprocess.DEVNULL)
     try:
         await asyncio.sleep(60.0)  # kernels may have to be compiled
         await look(robot.pid, 30.0)
-        first, last = (await look(robot.pid, 60.0 * minutes))[:2]
+        looked = browse(robot.pid, 60.0 * minutes, *browser) if browser else look(robot.pid, 60.0 * minutes)
+        first, last = (await looked)[:2]
         await asyncio.sleep(180.0)
         alone = (await look(robot.pid, 1.0))[0]
     finally:
@@ -64,4 +92,4 @@ async def main(minutes: float) -> None:
         print(f"{what}: {t1 - t0:.0f} robot s, {(cpu1 - cpu0) / (t1 - t0):.3f} CPU s each, {mb0:.0f} to {mb1:.0f} MB")
 
 
-asyncio.run(main(float(sys.argv[1])))
+asyncio.run(main(float(sys.argv[1]), sys.argv[2:]))
