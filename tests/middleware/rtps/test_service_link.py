@@ -20,6 +20,7 @@ from golem.middleware.ros import codec
 from golem.middleware.ros.msgs.std_srvs import SetBool_Request, SetBool_Response
 from golem.middleware.ros.node import RosNode
 from golem.middleware.ros.node_endpoints import PARTICIPANT_USER_DATA
+from golem.middleware.ros.service import LARGEST, Origin, Responder
 from golem.middleware.rtps import announcements, submessages
 from golem.middleware.rtps.announcements import SPDP_READER, SPDP_WRITER, WRITERS_READER, WRITERS_WRITER
 from golem.middleware.rtps.service_link import GROUP
@@ -116,6 +117,29 @@ def test_a_request_is_answered_once_and_to_its_client(server: tuple[RosNode, int
         (PREFIX + REPLIES, 1): True,
         (PREFIX + REPLIES, 2): False,
     }
+
+
+def test_an_answer_too_large_for_a_datagram_ends_nobody_and_is_answered_for(server: tuple[RosNode, int]) -> None:
+    """An action gives its result whenever its skill ends, where no guard of callbacks stands around it."""
+    node, domain = server
+    origins, told = list[Origin](), list[str]()
+    responder = Responder(node._endpoints, "/set", "std_srvs/srv/SetBool", lambda origin, _: origins.append(origin))
+    node.guard.log = told.append
+    client = Client(domain)
+    client.announce()
+    until(node, client, lambda: client.server)
+    client.learn("rq/setRequest")
+    client.ask(1, SetBool_Request(True))
+    until(node, client, lambda: any(origin.linked for origin in origins))
+    large = codec.serialize(SetBool_Response(True, "x" * 70_000))
+    responder.reply(next(origin for origin in origins if origin.linked), large)
+    until(node, client, client.replies)
+    assert codec.deserialize(client.replies()[0].payload, SetBool_Response) == SetBool_Response()
+    assert "'/set'" in told[0] and "rmw_cyclonedds_cpp" in told[0]
+    largest = codec.serialize(SetBool_Response(True, "x" * (LARGEST - 13)))
+    assert len(largest) == LARGEST
+    responder.reply(next(origin for origin in origins if origin.linked), largest)
+    until(node, client, lambda: len(client.replies()) > 1)
 
 
 def test_a_server_that_closes_says_goodbye(server: tuple[RosNode, int]) -> None:

@@ -26,6 +26,8 @@ MAX_PENDING = 1000
 """Unanswered requests of one client; beyond it the oldest is given up."""
 MAX_REACHED = 1000
 """Clients of one server that are remembered to be within reach."""
+LARGEST = 65_000
+"""Bytes of an answer to a client of Fast DDS [own]: one datagram takes it, 65 507 bytes, with what goes before it."""
 HOLD = 0.1
 """How long a reply waits for the client's reader to be discovered [s]; that of `rmw_send_response`."""
 
@@ -129,7 +131,7 @@ class Responder:
         """Give requests for the service with absolute `name` to `handle`, which shall `reply` some time."""
         self.name, self.malformed = name, 0
         self._endpoints, self._handle = endpoints, handle
-        self._request = codec.service(type).Request
+        self._type = codec.service(type)
         self._held: deque[tuple[float, int, bytes]] = deque(maxlen=SERVICES.depth)
         self._reached: set[int] = set()
         self._warned = False
@@ -143,7 +145,13 @@ class Responder:
         endpoints.attend(self)
 
     def reply(self, origin: Origin, response: Payload) -> None:
-        """Answer the request that came from `origin` by `response` (CDR)."""
+        """Answer the request that came from `origin` by `response` (CDR); by zeros where it is too large to be sent."""
+        if origin.linked and len(response) > LARGEST:
+            self._endpoints.guard.log(
+                f"An answer of '{self.name}' has {len(response)} bytes, and clients of Fast DDS take {LARGEST}: one "
+                "got zeros instead. Start it with RMW_IMPLEMENTATION=rmw_cyclonedds_cpp."
+            )
+            response = codec.serialize(self._type.Response())
         payload = pack(origin.header, response)
         if origin.linked and self._linked is not None:
             self._linked.writer.write(payload)
@@ -205,7 +213,7 @@ class Responder:
     def _receive(self, sample: Sample, linked: bool) -> None:
         try:
             header, body = unpack(sample.payload)
-            request = codec.deserialize(body, self._request)
+            request = codec.deserialize(body, self._type.Request)
         except CodecError:
             self.malformed += 1
             return
