@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 from tests.runtime.live.conftest import Live, live  # noqa: F401 - a fixture
 
@@ -12,7 +13,15 @@ from golem.agent.audit import AuditLog
 from golem.agent.desk import Answer, Call, Desk
 from golem.agent.domain_body import DomainBody
 from golem.agent.tool_rules import Rules
-from golem.types import TICK
+from golem.interfaces import public
+from golem.middleware.dds.local import LocalDomain
+from golem.middleware.ros import codec, names
+from golem.middleware.ros.msgs.nav_msgs import MapMetaData, OccupancyGrid
+from golem.middleware.ros.node import RosNode
+from golem.middleware.wire.convert import encode_low_state
+from golem.middleware.wire.hg import LOW_STATE
+from golem.runtime.live.skill_messages import list_message
+from golem.types import TICK, Imu, LowState
 
 
 @pytest.fixture
@@ -75,3 +84,26 @@ def test_a_stop_of_the_motors_is_the_gates(desk: Desk, live: Live) -> None:  # n
     assert desk.call("stop", {"motors": True})["success"]
     live.run(0.2)
     assert live.state is not None and live.state.value.startswith("stop")
+
+
+def test_what_cannot_be_read_is_left_out() -> None:
+    """One damaged frame ended the process, and the skill that ran went on without its rules."""
+    domain = LocalDomain()
+    participant, row = domain.participant(), public.topic("/skill/list")
+    robot = RosNode(participant, "robot")
+    robot.publisher(row.name, row.type, row.qos).publish(list_message(()))
+    client = domain.participant()
+    body = DomainBody(client, RosNode(client, "mcp", log=lambda line: None), "start one")
+    row = public.topic("/map")
+    robot.publisher(row.name, row.type, row.qos).publish(OccupancyGrid(info=MapMetaData(width=3, height=3)))
+    row = public.topic("/lowstate")
+    states = participant.writer(names.topic(row.name), codec.dds_name(row.type), row.qos)
+    states.write(LOW_STATE.blank())
+    body.step()
+    assert body.t == 0.0 and body.read("map")["map"] is None
+    q = np.zeros(27)
+    states.write(
+        encode_low_state(LowState(1.5, q, q, q, Imu(np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), np.zeros(3))))
+    )
+    body.step()
+    assert body.t == 1.5

@@ -128,11 +128,11 @@ class DomainBody(Body):
         self._node.spin_once(SPIN)
         for name, (heard, before) in self._heard.items():
             if heard.count() != before:
-                self._take(name, heard.latest())
+                self._node.guard.call(name, self._take, name, heard.latest())
                 self._heard[name] = heard, heard.count()
         states = [sample for sample in self._states.take() if sample.alive]
         if states:
-            self._take("/lowstate", states[-1].payload)
+            self._node.guard.call("/lowstate", self._take, "/lowstate", states[-1].payload)
 
     def _take(self, name: str, message: Any) -> None:
         row = public.topic(name)
