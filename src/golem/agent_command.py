@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import secrets
+import signal
 import socket
 import sys
 import threading
@@ -134,6 +135,9 @@ def run_mcp(config: McpConfig) -> bool:
     stack = None if config.stack is None else load_stack(config.stack, profile=config.profile)
     listener = listen("127.0.0.1", config.port) if served and config.port is not None else None
     with ExitStack() as ending:
+        for number in (signal.SIGTERM, signal.SIGHUP):  # of clients, and of terminals
+            if signal.getsignal(number) is not signal.SIG_IGN:
+                ending.callback(signal.signal, number, signal.signal(number, signal.default_int_handler))
         log = AuditLog(config.audit, bag=str(config.record or ""), stack=config.stack or "", rules=str(config.rules))
         ending.callback(log.close)
         view: LiveView | None = None
@@ -151,6 +155,7 @@ def run_mcp(config: McpConfig) -> bool:
                     view = ending.enter_context(LiveView(running, shown(running, robot), passive=True))
             body = StackBody(running, robot, config.paced or config.view, None if config.record is None else show)
         desk = Desk(body, rules, log)
+        ending.callback(desk.leave_all)  # however it ends: on a domain the robot would go on
         operator = ToolOperator(desk, _say, (lambda text: None) if view is None else view.panel.ask)
         if view is not None:
             view.decide = operator.decide
@@ -189,7 +194,7 @@ def _token(config: McpConfig) -> str:
 
 
 def _serve(desk: Desk, listener: socket.socket | None, token: str) -> None:
-    """Serve on a thread, while this one has the robot; what runs when the client has left is cancelled first."""
+    """Serve on a thread, while this one has the robot, until the client has left."""
     left = threading.Event()
     if listener is not None:
         _say(f"http://127.0.0.1:{listener.getsockname()[1]}/mcp   Authorization: Bearer {token}\n{HELP}")
@@ -203,4 +208,3 @@ def _serve(desk: Desk, listener: socket.socket | None, token: str) -> None:
     threading.Thread(target=serve, name="mcp", daemon=True).start()
     with suppress(KeyboardInterrupt):
         desk.run(left.is_set)
-    desk.leave_all()

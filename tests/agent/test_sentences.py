@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import io
+import os
+import signal
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.agent.fake_body import Rig
+from tests.agent.fake_body import FakeBody, Rig
 
 from golem.agent.answers import words
 from golem.agent.sentences import SentencePlanner, replay
 from golem.agent.tool_rules import Rules
+from golem.agent_command import McpConfig, run_mcp
 from golem.errors import ConfigError
 from golem.evaluation.rungs.errands import SUITE
 
@@ -173,6 +178,37 @@ def test_each_call_is_compared_with_the_answer_of_its_own_start(tmp_path: Path) 
         Rig(tmp_path, rules).desk.call("go", {"x": 1.0})
     now = Rig(tmp_path / "now", Rules(default="free"))
     assert [(a, b) for _, a, b in replay(tmp_path / "audit.jsonl", now.desk.call)] == [(True, True), (False, True)]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_robot_on_a_domain_does_not_go_on_when_the_command_is_ended(
+    number: signal.Signals, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    then, before = Rig(tmp_path, Rules(default="free")), signal.getsignal(number)
+    then.desk.call("go", {"x": 1.0})
+    body = FakeBody()
+
+    @contextmanager
+    def member(*_: object) -> Iterator[tuple[None, None]]:
+        yield None, None
+
+    def step() -> None:
+        FakeBody.step(body)
+        if len(body.track) == 3:
+            body.track.append(0.0)
+            os.kill(os.getpid(), number)
+
+    body.step = step
+    monkeypatch.setattr("sys.stdin", io.StringIO())
+    monkeypatch.setattr("golem.agent_command.member", member)
+    monkeypatch.setattr("golem.agent_command.DomainBody", lambda *_: body)
+    rules = tmp_path / "rules.yaml"
+    rules.write_text("default: free")
+    with pytest.raises(KeyboardInterrupt):
+        run_mcp(McpConfig(replay=then.file, rules=rules, audit=tmp_path / "now.jsonl"))
+    ended = body.result()
+    assert ended is not None and ended.stage == "cancelled"
+    assert signal.getsignal(number) == before
 
 
 def test_no_screws_are_taken_where_none_are_wanted() -> None:
