@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 from typing import Any
 
 import pytest
 from tests.agent.fake_body import HOSTILE, Rig
 
+from golem.agent.audit import AuditLog
 from golem.agent.desk import Answer, Call
 from golem.agent.tool_rules import Region, Rules, ToolRule
+from golem.errors import OutputError
 
 FREE = Rules(default="free", calls=1000)
 
@@ -243,3 +246,33 @@ def test_nothing_goes_on_for_a_client_that_is_gone(rig: Rig) -> None:
     other = ask(rig, "go", "b", x=1.0, steps=100)
     rig.desk.leave_all()
     assert other.answered.done() and not rig.body.busy
+
+
+def test_what_cannot_be_logged_does_not_go_on(rig: Rig) -> None:
+    """A full disk ended the process with an error, and a robot on a domain went on."""
+    call, log = ask(rig, "go", x=1.0, steps=100), rig.log._out
+    kept, full = os.dup(log), os.open("/dev/full", os.O_WRONLY)
+    os.dup2(full, log)
+    assert ended(rig, ask(rig, "read", resource="state"))["success"]
+    data = ended(rig, call)
+    assert data["stage"] == "rules" and "No space left on device" in reason(data) and len(rig.body.track) < 10
+    refused = ended(rig, ask(rig, "go", x=1.0))
+    assert refused["stage"] == "refused" and str(rig.file) in reason(refused)
+    assert rig.desk.call("stop", {"motors": True})["success"] and rig.body.stopped == 1
+    os.dup2(kept, log)
+    assert ended(rig, ask(rig, "go", x=1.0))["success"]
+    assert rig.events()[-3:] == ["call", "begin skill", "answer"]
+
+
+def test_of_an_entry_that_does_not_fit_nothing_is_left(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+    write = os.write
+    monkeypatch.setattr("os.write", lambda file, data: write(file, data[:20]))
+    assert "No space left on device" in reason(rig.desk.call("go", {"x": 1.0}))
+    monkeypatch.undo()
+    assert rig.events() == ["begin"] and rig.desk.call("go", {"x": 1.0})["success"]
+    assert rig.events() == ["begin", "call", "begin skill", "answer"]
+
+
+def test_a_log_that_cannot_be_begun_is_said() -> None:
+    with pytest.raises(OutputError, match="Cannot write /dev/full: No space left on device"):
+        AuditLog(Path("/dev/full"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import time
@@ -16,21 +17,32 @@ LONGEST = 4000
 
 
 class AuditLog:
-    """Writes one file."""
+    """Writes one file; `problem` says why the newest entry is not in it, empty where it is."""
 
     def __init__(self, file: Path, **first: object) -> None:
         """Go on with `file`; `first` says what it belongs to, e.g. a bag. Raises OutputError: it cannot be written."""
+        self._file, self.problem = file, ""
         try:
             file.parent.mkdir(parents=True, exist_ok=True)
             self._out = os.open(file, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600)
         except OSError as error:
             raise OutputError(f"Cannot write {file}: {error.strerror}.") from error
         self.write("begin", 0.0, **first)
+        if self.problem:
+            self.close()
+            raise OutputError(self.problem)
 
     def write(self, event: str, t: float, **facts: object) -> None:
         """Add what happened at robot time `t` [s], with facts as JSON has them."""
         entry = {"event": event, "utc": time.time(), "t": t, **{k: _kept(v) for k, v in facts.items()}}
-        os.write(self._out, (json.dumps(entry) + "\n").encode("utf-8", "replace"))
+        line = (json.dumps(entry) + "\n").encode("utf-8", "replace")
+        try:
+            written, self.problem = os.write(self._out, line), ""
+            if written < len(line):  # of a full disk; half a line would spoil the next one
+                os.ftruncate(self._out, os.fstat(self._out).st_size - written)
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        except OSError as error:
+            self.problem = f"Cannot write {self._file}: {error.strerror}."
 
     def close(self) -> None:
         """Close the file."""

@@ -250,6 +250,8 @@ class Desk:
         return [place for place in places if place is not None]
 
     def _begin(self, call: Call) -> None:
+        if self._audit.problem:
+            raise GolemError(self._audit.problem)
         if self._active is not None:
             raise GolemError("Another skill is running; cancel it first.")
         self.body.begin("remember" if call.tool == "look" else call.tool, call.fields)
@@ -267,7 +269,8 @@ class Desk:
         result = self.body.result()
         if result is None:
             moment = self.body.moment()
-            excess = "" if moment is None or self._over else self._excess(moment)
+            excess = "" if moment is None else self._excess(moment)
+            excess = "" if self._over else self._audit.problem or excess
             if excess:
                 self._over = excess
                 self._tell("excess", call, why=excess)
