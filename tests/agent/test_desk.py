@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import pytest
 from tests.agent.fake_body import HOSTILE, Rig
@@ -276,3 +276,34 @@ def test_of_an_entry_that_does_not_fit_nothing_is_left(rig: Rig, monkeypatch: py
 def test_a_log_that_cannot_be_begun_is_said() -> None:
     with pytest.raises(OutputError, match="Cannot write /dev/full: No space left on device"):
         AuditLog(Path("/dev/full"))
+
+
+def looking(run: str, **rest: Any) -> Rules:
+    rule = ToolRule(cast(Any, run), **rest)
+    return Rules(default="free", calls=1000, tools={"look": rule, "read": rule})
+
+
+@given(
+    looking("never"), looking("free", count=0), looking("free", fields={"camera": ["left_hand"], "resource": ["map"]})
+)
+def test_rules_of_looking_and_reading_hold(rig: Rig) -> None:
+    """They were read, and then nobody asked them: pictures went out that the rules keep in."""
+    for labels in ((), ("mug",)):
+        assert rig.desk.call("look", {"camera": "head", "labels": list(labels)})["stage"] == "refused"
+    assert rig.desk.call("read", {"resource": "state"})["stage"] == "refused"
+    assert rig.body.began == []
+
+
+@given(looking("ask", count=1))
+def test_the_operator_is_asked_before_a_picture_goes_out(rig: Rig) -> None:
+    for tool, arguments in (("look", {}), ("read", {"resource": "state"})):
+        call = ask(rig, tool, **arguments)
+        assert not call.answered.done()
+        rig.desk.decide(call.number, True)
+        assert ended(rig, call)["success"] and not rig.desk.call(tool, arguments)["success"]
+
+
+@given(Rules(default="never", calls=1000))
+def test_without_a_rule_of_their_own_looking_and_reading_are_free(rig: Rig) -> None:
+    assert rig.desk.call("look", {"labels": ["mug"]})["success"]
+    assert rig.desk.call("read", {"resource": "state"})["success"]

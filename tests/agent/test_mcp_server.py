@@ -52,6 +52,8 @@ def test_the_schemas_of_every_shipped_skill_are_sound(tmp_path: Path) -> None:
     rig.body.specs = SkillTable(Stack()).specs
     tools = {tool.name: tool for tool in tool_specs(rig.desk)}
     assert {"stop", "look", "read", "walk", "pick", "recall"} <= set(tools)
+    asks = {name: "operator is asked" in tools[name].text for name in ("stop", "look", "read", "walk", "pick")}
+    assert asks == {"stop": False, "look": False, "read": False, "walk": False, "pick": True}
     for tool in tools.values():
         for schema in (tool.takes, tool.gives):
             jsonschema.Draft202012Validator.check_schema(schema)

@@ -201,14 +201,6 @@ class Desk:
         call.fields = fields = read_fields(self._spec(call.tool), call.arguments)
         if call.tool == "stop":
             return self._stop(call)
-        if call.tool == "read":
-            name = fields["resource"]
-            return self._answer(call, Answer({"success": True, name: self.body.read(name)}))
-        if call.tool == "look":
-            if not fields["labels"]:
-                return self._answer(call, _seen(self.body.picture(fields["camera"])))
-            call.fields = read_fields(self._spec("remember"), {**fields, "seconds": LOOK})
-            return self._begin(call)
         rule = self.rules.of(call.tool)
         problem = self.rules.problem(call.tool, fields, self._places(fields))
         if rule.run == "never":
@@ -250,6 +242,14 @@ class Desk:
         return [place for place in places if place is not None]
 
     def _begin(self, call: Call) -> None:
+        if call.tool in OWN and not call.fields.get("labels"):
+            self._count[call.tool] += 1
+            if call.tool == "look":
+                return self._answer(call, _seen(self.body.picture(call.fields["camera"])))
+            name = call.fields["resource"]
+            return self._answer(call, Answer({"success": True, name: self.body.read(name)}))
+        if call.tool == "look":
+            call.fields = read_fields(self._spec("remember"), {**call.fields, "seconds": LOOK})
         if self._audit.problem:
             raise GolemError(self._audit.problem)
         if self._active is not None:

@@ -38,7 +38,7 @@ class ToolSpec:
 def tool_specs(desk: Desk) -> list[ToolSpec]:
     """Return every tool of a desk, the fields of its goal as narrow as the rules make them."""
     done: Schema = {"type": "object", "properties": {"success": {"type": "boolean"}}, "required": ["success"]}
-    own = [ToolSpec(spec.name, spec.summary, spec.goal, done, True) for spec in OWN.values()]
+    own = [ToolSpec(n, s.summary + _ASKS[desk.rules.of(n).run], s.goal, done, True) for n, s in OWN.items()]
     return own + [_of_skill(spec, desk.rules.of(name)) for name, spec in sorted(desk.body.specs.items())]
 
 

@@ -14,6 +14,8 @@ from golem.types import Array
 
 Run = Literal["free", "ask", "never"]
 """free: at once. ask: the operator says yes or no, each time. never: refused."""
+FREE = ("stop", "look", "read")
+"""Tools that are no skills: free without a rule of their own, and `stop` always."""
 Span = tuple[float, float]
 STOPPING = 0.5
 """Time in which a robot that is told to stand stops [s]: it is told that long before it would leave the region."""
@@ -88,7 +90,7 @@ class Rules:
 
     def of(self, tool: str) -> ToolRule:
         """Return the rule of a tool."""
-        return self.tools.get(tool) or ToolRule(self.default)
+        return self.tools.get(tool) or ToolRule("free" if tool in FREE else self.default)
 
     def problem(self, tool: str, goal: Mapping[str, Any], places: list[tuple[float, float]]) -> str:
         """Return why a goal is not allowed; empty where it is.
