@@ -57,7 +57,7 @@ class Robot:
     """A stack's side: the navigator, its link, and the bridge."""
 
     def __init__(self, nav2: bool = True, config: Nav2Config | None = None) -> None:
-        domain = LocalDomain()
+        domain = self.domain = LocalDomain()
         self.nav2 = FakeNav2(domain) if nav2 else None
         self.bus, self.t = Bus(), 0.0
         self.node = RosNode(domain.participant(), "stack")
@@ -114,6 +114,19 @@ def test_nav2_that_gives_up_or_refuses_ends_the_walk() -> None:
     robot.nav2.accepts = False
     robot.begin(PlanarPose(3.0, 0.0, 0.0))
     assert "refused" in (robot.until(lambda step: step.ended).failure or "")
+
+
+def test_nav2_that_dies_is_missed_even_if_it_comes_back() -> None:
+    robot = Robot(config=Nav2Config(patience=1.0))
+    assert robot.nav2 is not None
+    robot.begin()
+    robot.until(lambda step: step.note == "nav2")
+    dead, robot.nav2 = robot.nav2, None
+    dead.node.close()
+    robot.until(lambda step: step.note == "wait for nav2", 20)
+    robot.nav2 = FakeNav2(robot.domain)
+    step = robot.until(lambda step: step.ended, 60)
+    assert "/navigate_to_pose" in (step.failure or "") and step.twist == Twist()
 
 
 def test_without_nav2_it_says_what_is_missing() -> None:

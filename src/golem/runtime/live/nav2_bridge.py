@@ -62,7 +62,8 @@ class Nav2Bridge(Node):
             else:
                 self._tell("absent")
         if self._active is not None:
-            state = ENDED.get(self._active.status, "active")
+            # A Nav2 that died tells no end, and one that was started again does not know the goal.
+            state = ENDED.get(self._active.status, "active" if self._client.ready() else "absent")
             self._tell(state)
             if state != "active":
                 self._active = None
