@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,14 +15,15 @@ from golem.agent.desk import Answer, Call, Desk
 from golem.agent.domain_body import DomainBody
 from golem.agent.tool_rules import Rules
 from golem.interfaces import public
-from golem.middleware.dds.local import LocalDomain
+from golem.interfaces import ros_convert as convert
+from golem.middleware.dds.local import LocalDomain, LocalParticipant
 from golem.middleware.ros import codec, names
 from golem.middleware.ros.msgs.nav_msgs import MapMetaData, OccupancyGrid
 from golem.middleware.ros.node import RosNode
 from golem.middleware.wire.convert import encode_low_state
 from golem.middleware.wire.hg import LOW_STATE
 from golem.runtime.live.skill_messages import list_message
-from golem.types import TICK, Imu, LowState
+from golem.types import TICK, Imu, LowState, PlanarPose
 
 
 @pytest.fixture
@@ -86,14 +88,34 @@ def test_a_stop_of_the_motors_is_the_gates(desk: Desk, live: Live) -> None:  # n
     assert live.state is not None and live.state.value.startswith("stop")
 
 
-def test_what_cannot_be_read_is_left_out() -> None:
-    """One damaged frame ended the process, and the skill that ran went on without its rules."""
+@pytest.fixture
+def silent() -> tuple[LocalParticipant, RosNode, DomainBody]:
+    """A stack without skills, of which a test says what it says, and the body of a client of its."""
     domain = LocalDomain()
     participant, row = domain.participant(), public.topic("/skill/list")
     robot = RosNode(participant, "robot")
     robot.publisher(row.name, row.type, row.qos).publish(list_message(()))
     client = domain.participant()
-    body = DomainBody(client, RosNode(client, "mcp", log=lambda line: None), "start one")
+    return participant, robot, DomainBody(client, RosNode(client, "mcp", log=lambda line: None), "start one")
+
+
+def test_a_place_in_the_map_is_known_in_odom(silent: tuple[LocalParticipant, RosNode, DomainBody]) -> None:
+    """The rules' region refused every goal in the map, since nobody listened to where that is."""
+    _, robot, body = silent
+    assert body.in_odom("map", 1.0, 0.0) is None
+    row = public.topic("/tf", "stack")
+    told = robot.publisher(row.name, row.type, row.qos)
+    place = PlanarPose(2.0, 1.0, math.pi / 2).matrix()
+    told.publish(convert.transforms(0.5, [("odom", "base_link"), ("map", "odom")], np.array([np.eye(4), place])))
+    told.publish(convert.transforms(0.5, [("odom", "base_link")], np.eye(4)[np.newaxis]))
+    body.step()
+    assert body.in_odom("map", 2.0, 3.0) == pytest.approx((2.0, 0.0))
+    assert body.in_odom("odom", 2.0, 3.0) == (2.0, 3.0)
+
+
+def test_what_cannot_be_read_is_left_out(silent: tuple[LocalParticipant, RosNode, DomainBody]) -> None:
+    """One damaged frame ended the process, and the skill that ran went on without its rules."""
+    participant, robot, body = silent
     row = public.topic("/map")
     robot.publisher(row.name, row.type, row.qos).publish(OccupancyGrid(info=MapMetaData(width=3, height=3)))
     row = public.topic("/lowstate")

@@ -12,8 +12,9 @@ import cv2
 import numpy as np
 
 from golem.agent.body import Body, Picture, drawn
-from golem.interfaces import public
+from golem.interfaces import public, topics
 from golem.interfaces import ros_convert as convert
+from golem.interfaces.nav_payloads import HERE, MapPlace
 from golem.interfaces.payloads import Feedback
 from golem.middleware.bus import Bus
 from golem.middleware.dds.base import Participant
@@ -29,6 +30,7 @@ from golem.runtime.live.node_setup import SEARCH, until
 from golem.runtime.live.skill_client import ask_skills
 from golem.runtime.live.skill_messages import RUN
 from golem.skills.base import SkillResult
+from golem.types import PlanarPose
 
 SPIN = 0.02
 """Time that is waited for news at once [s]."""
@@ -49,6 +51,8 @@ class DomainBody(Body):
         self._client = node.action_client(RUN, next(row.type for row in public.ACTIONS if row.name == RUN))
         self._stopper = node.client("/safety/stop", public.TRIGGER)
         self._heard = {name: (self._listen(name), 0) for name in HEARD}
+        row = public.topic("/tf")
+        node.subscription(row.name, row.type, self._place, row.qos)
         row = public.topic("/lowstate")
         self._states = participant.reader(names.topic(row.name), codec.dds_name(row.type), row.qos)
         self._goal: ClientGoal | None = None
@@ -133,6 +137,13 @@ class DomainBody(Body):
         states = [sample for sample in self._states.take() if sample.alive]
         if states:
             self._node.guard.call("/lowstate", self._take, "/lowstate", states[-1].payload)
+
+    def _place(self, message: Any) -> None:
+        """Take where the map is in odom of the base estimate, by which this body goes."""
+        for told in message.transforms:
+            if (told.header.frame_id, told.child_frame_id) == (convert.MAP_FRAME, "odom"):
+                T = PlanarPose.of(convert.transform_matrix(told.transform))
+                self._bus.publish(topics.MAP_POSE, MapPlace(self.t, T.to(HERE), T), self.t)
 
     def _take(self, name: str, message: Any) -> None:
         row = public.topic(name)
