@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +24,7 @@ from golem.middleware.ros.msgs.geometry_msgs import PoseWithCovariance
 from golem.middleware.ros.msgs.nav_msgs import Odometry
 from golem.middleware.wire.convert import encode_low_command, encode_low_state
 from golem.robots.model.table import JOINT_INDEX
-from golem.runtime.live.black_box import BlackBox
+from golem.runtime.live.black_box import STATUS, BlackBox
 from golem.types import Imu, LowCommand, LowState
 
 meshes_are_made_once = test_live.meshes_are_made_once
@@ -132,6 +133,25 @@ def test_any_bag_is_played_from_its_start(tmp_path: Path) -> None:
         view._joint.value, view._quantity.value = "left_knee", "speed [rad/s]"
         view.update()
         assert (view._plot.data[1] == 1.0).all() and view._plot.data[0][0] == pytest.approx(-1.0)
+
+
+@pytest.mark.parametrize(("stop", "shown"), [(None, 3.0), (1, 1.0), (2, 2.0), (3, 3.0)])
+def test_of_a_robot_that_was_restarted_one_start_is_shown(tmp_path: Path, stop: int | None, shown: float) -> None:
+    """Its clock began again: states of the first start were shown as those of a stop in the second."""
+    bag = BagWriter(tmp_path / "bag")
+    rows = {name: topic(name, public.topic(name).type) for name in ("/lowstate", STATUS)}
+    for start, length in ((1, 250), (2, 150), (3, 200)):
+        for k in range(length):
+            at = 20_000_000 * k
+            one = replace(state(at * 1e-9), q=np.full(27, float(start)))
+            bag.write(BagMessage(rows["/lowstate"], at, at, encode_low_state(one)))
+            if start == stop and k == 100:
+                status = convert.gate_status(GateStatus(at * 1e-9, GateState.STOP1, Reason.REQUESTED))
+                bag.write(BagMessage(rows[STATUS], at, at, codec.serialize(status)))
+    bag.close()
+    recording = read_recording(tmp_path / "bag")
+    assert {one.q[0] for one in recording.states} == {shown} and (np.diff(recording.times) > 0.0).all()
+    assert recording.times[0] == pytest.approx(0.0 if stop is None else -2.0)
 
 
 def test_it_opens_at_the_moment_of_the_fault_and_the_slider_moves_the_robot(folder: Path) -> None:

@@ -25,9 +25,10 @@ from golem.interfaces import images, public
 from golem.interfaces.payloads import GateStatus
 from golem.interfaces.ros_convert import matrix, to_gate_status
 from golem.middleware.bags.reader import Bag
+from golem.middleware.bags.writer import JUMP
 from golem.middleware.interrupt import interrupted
 from golem.middleware.ros import codec
-from golem.middleware.ros.message import CodecError
+from golem.middleware.ros.message import NANO, CodecError
 from golem.middleware.ros.msgs.golem_interfaces import SafetyStatus
 from golem.middleware.ros.msgs.nav_msgs import Odometry
 from golem.middleware.ros.msgs.sensor_msgs import Image
@@ -114,6 +115,8 @@ class Recording:
 def read_recording(path: Path) -> Recording:
     """Read the states of the bag at `path`. Frames that nobody could read are left out.
 
+    Of a robot that was restarted meanwhile they are those since its last start, or of the start that its stop ended.
+
     Raises:
         BagError: there is none, or it is damaged.
         ConfigError: it holds no state of a robot.
@@ -124,14 +127,19 @@ def read_recording(path: Path) -> Recording:
     told: LowCommand | None = None
     base: Array | None = None
     gate: GateStatus | None = None
-    machine = 0
+    machine, stopped = 0, False
     for message in bag.messages(("/lowstate", "/lowcmd", "/odom", "/safety/status")):
         t = (message.log_time - zero) * 1e-9
+        if rows and t < rows[-1][0] - JUMP / NANO:
+            if stopped:
+                break
+            rows, told, base, gate = [], None, None, None
         try:
             if message.topic.name == "/odom":
                 base = matrix(codec.deserialize(message.payload, Odometry).pose.pose)
             elif message.topic.name == "/safety/status":
                 gate = to_gate_status(codec.deserialize(message.payload, SafetyStatus))
+                stopped = stopped or gate.stopped
             elif message.topic.name == "/lowcmd":
                 told = convert.decode_low_command(message.payload, t, machine)
             elif not rows or t - rows[-1][0] > 0.95 * SPARSE or (stop is not None and abs(t) < DENSE):
