@@ -14,6 +14,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import msgspec
@@ -80,8 +81,11 @@ async def main(minutes: float, browser: Sequence[str]) -> None:
     """Print the two costs."""
     robot = subprocess.Popen(["golem", "run", "stand", "--port", str(PORT)], stdout=subprocess.DEVNULL)
     try:
-        await asyncio.sleep(60.0)  # kernels may have to be compiled
-        await look(robot.pid, 30.0)
+        while True:  # kernels may have to be compiled
+            await asyncio.sleep(5.0)
+            with suppress(OSError):
+                await look(robot.pid, 30.0)
+                break
         looked = browse(robot.pid, 60.0 * minutes, *browser) if browser else look(robot.pid, 60.0 * minutes)
         first, last = (await looked)[:2]
         await asyncio.sleep(180.0)

@@ -37,7 +37,8 @@ class Ticks:
     """Counts states and the commands that answer them; a sink of the recorder."""
 
     def __init__(self) -> None:
-        self._decode = {STATE: codec.message("unitree_hg/msg/LowState"), COMMAND: codec.message("unitree_hg/msg/LowCmd")}
+        kinds = {STATE: "unitree_hg/msg/LowState", COMMAND: "unitree_hg/msg/LowCmd"}
+        self._decode = {topic: codec.message(kind) for topic, kind in kinds.items()}
         self.states, self.answered = set[int](), set[int]()
 
     def add(self, topic: BagTopic) -> None:
@@ -61,6 +62,7 @@ class Ticks:
 
 @contextmanager
 def running(*words: str) -> Iterator[subprocess.Popen[bytes]]:
+    """Have a command run on the domain; it is interrupted at the end."""
     process = subprocess.Popen([*GOLEM, *words, *HERE], stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
     try:
         yield process
@@ -70,6 +72,7 @@ def running(*words: str) -> Iterator[subprocess.Popen[bytes]]:
 
 
 def golem(*words: str) -> bool:
+    """Run a command on the domain, and return whether it succeeded."""
     return subprocess.run([*GOLEM, *words, *HERE], capture_output=True, check=False).returncode == 0
 
 
