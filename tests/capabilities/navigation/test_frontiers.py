@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
+import numpy as np
 from tests.capabilities.navigation.rooms import room, wall_with_gap
 
 from golem.capabilities.navigation.frontiers import frontiers
@@ -33,6 +35,15 @@ def test_the_end_of_what_is_known_is_looked_at_from_a_metre_away() -> None:
 def test_what_is_behind_a_wall_is_none() -> None:
     grid = seen_up_to(room(*wall_with_gap((0.0, 0.0))), 6.0)
     assert frontiers(grid, 0.5, HERE) == []
+
+
+def test_one_all_around_the_robot_is_looked_at_from_near_it() -> None:
+    grid = room(size=(-8.0, 8.0, -8.0, 8.0))
+    rows, columns = np.indices(grid.cells.shape)
+    away = np.hypot(rows - 159.5, columns - 159.5) * grid.resolution
+    (frontier,) = frontiers(replace(grid, cells=np.where(away < 5.0, grid.cells, np.int8(-1))), 0.5, HERE)
+    assert math.hypot(frontier.pose.x, frontier.pose.y) > 3.5
+    assert abs(frontier.pose.yaw - math.atan2(frontier.pose.y, frontier.pose.x)) < 0.3
 
 
 def test_the_map_may_be_turned() -> None:

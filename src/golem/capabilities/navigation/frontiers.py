@@ -13,6 +13,8 @@ from golem.types import PlanarPose
 
 SMALLEST = 0.6
 """Length of a frontier from which on it is worth a way [m]."""
+ASIDE = 0.1
+"""Share of the way there that counts among places to look from: the straight look is the nearest [own]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,19 +46,21 @@ def frontiers(grid: OccupancyGrid, radius: float, base: PlanarPose, standoff: fl
     places = costmap.places(open_cells)
     nearest = open_cells[int(((places - (base.x, base.y)) ** 2).sum(axis=1).argmin())]
     mine = rooms[open_cells[:, 0], open_cells[:, 1]] == rooms[nearest[0], nearest[1]]
-    open_cells, places = open_cells[mine], places[mine]
+    places = places[mine]
+    ways = np.hypot(*(places - (base.x, base.y)).T)
     found: list[tuple[float, Frontier]] = []
     for i in range(1, count):
         length = float(stats[i, cv2.CC_STAT_AREA]) * grid.resolution
         if length < SMALLEST:
             continue
-        middle = costmap.places(np.array([[round(centroids[i, 1]), round(centroids[i, 0])]]))[0]
+        cells = np.argwhere(labels == i)
+        # On the border itself: the middle of one around the robot is where the robot is.
+        middle = costmap.places(cells[[((cells - centroids[i, ::-1]) ** 2).sum(axis=1).argmin()]])[0]
         off = np.abs(np.hypot(*(places - middle).T) - standoff)
-        k = int(off.argmin())
+        k = int((off + ASIDE * ways).argmin())
         if off[k] > 1.5:
             continue
         x, y = places[k].tolist()
         yaw = float(np.arctan2(middle[1] - y, middle[0] - x))
-        way = float(np.hypot(x - base.x, y - base.y))
-        found.append((length / (1.0 + way), Frontier(PlanarPose(x, y, yaw), length)))
+        found.append((length / (1.0 + float(ways[k])), Frontier(PlanarPose(x, y, yaw), length)))
     return [frontier for _, frontier in sorted(found, key=lambda row: -row[0])]
