@@ -76,6 +76,14 @@ def test_points_that_are_none_and_scans_of_other_clocks_are_left_out() -> None:
     assert a is not None and b is not None and (a.cells == b.cells).all()
 
 
+def test_it_maps_on_after_a_time_without_scans() -> None:
+    mapper = mapped(scans(3))
+    for scan in scans(3, first=100):
+        mapper.add_scan(with_box(scan, 1.5, 0.0))
+    grid = mapper.grid()
+    assert grid is not None and grid.t == pytest.approx(10.2) and value_near(grid, 1.55, 0.1, 0.1) == 100
+
+
 def test_a_map_from_before_is_found_from_a_rough_guess(tmp_path: Path) -> None:
     stored = mapped(scans(8)).stored()
     assert stored is not None

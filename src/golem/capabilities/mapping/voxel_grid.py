@@ -155,7 +155,7 @@ class WallMeans:
 
 
 LATE = 5.0
-"""Time by which a scan may be ahead of the one before [s]: more is another clock."""
+"""Time by which a scan may be ahead of the one before [s]: more is another clock, unless the next one follows it."""
 FIT = 0.6
 """Share of a scan's points that must be where the map has something for its place to count as found."""
 FAR_OFF = 0.3
@@ -237,13 +237,15 @@ class VoxelGridMapper:
         self._summed = -math.inf
         self._T_odom_map = PlanarPose(0.0, 0.0, 0.0)
         self._located = False
-        self._t = -math.inf
+        self._t = self._ahead = -math.inf
         self._followed = -math.inf
         self._newest: Array = np.zeros((0, 2))
 
     def add_scan(self, scan: Scan) -> None:
-        fresh = self._t < scan.t < (math.inf if self._t == -math.inf else self._t + LATE)
-        if not fresh or not np.isfinite([*scan.origin, *scan.floor]).all():
+        ahead = -math.inf < self._t and not scan.t < self._t + LATE
+        follows = 0.0 < scan.t - self._ahead < LATE
+        self._ahead = scan.t if ahead else -math.inf
+        if not self._t < scan.t or (ahead and not follows) or not np.isfinite([*scan.origin, *scan.floor]).all():
             return
         points = np.asarray(scan.points, np.float64)
         points = voxel_kernel.within(points, np.asarray(scan.origin, np.float64), self.config.reach)
