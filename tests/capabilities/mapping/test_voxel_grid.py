@@ -101,6 +101,26 @@ def test_a_map_from_before_is_found_from_a_rough_guess(tmp_path: Path) -> None:
     assert grid.in_map.origin.x == pytest.approx(stored.origin.x) and grid.cells.shape == stored.cells.shape
 
 
+def test_a_heading_that_drifted_far_from_where_odom_began_is_corrected(tmp_path: Path) -> None:
+    stored = mapped(scans(8)).stored()
+    assert stored is not None
+    save_map(tmp_path / "room", stored)
+    true, here = PlanarPose(1.2, -0.6, 0.3), PlanarPose(20.0, 0.0, 0.0)
+    shift = np.array([here.x, 0.0, 0.0])
+    seen = [replace(one, points=one.points + shift, origin=one.origin + shift) for one in scans(23, true, first=50)]
+    began = true @ here.to(PlanarPose(0.0, 0.0, 0.0))
+    config = GridConfig(file=str(tmp_path / "room.yaml"), guess=(began.x, began.y, began.yaw), follow=0.1)
+    mapper = mapped(seen[:3], config)
+    drift = PlanarPose(0.0, 0.0, 0.04)
+    for one in seen[3:]:  # the odometry believes to have turned, where it is
+        R = drift.matrix()[:3, :3]
+        mapper.add_scan(replace(one, points=(one.points - shift) @ R.T + shift))
+    place = mapper.T_odom_map
+    assert place is not None
+    off = true.to(place.to(here @ drift))
+    assert math.hypot(off.x, off.y) < 0.02 and abs(off.yaw) < 0.005
+
+
 def test_a_map_of_somewhere_else_is_not_believed(tmp_path: Path) -> None:
     stored = mapped(scans(8)).stored()
     assert stored is not None

@@ -258,7 +258,7 @@ class VoxelGridMapper:
             self._summed = scan.t
             self.walls.add(upright)
         self._newest = upright[:: max(1, len(upright) // 800)]
-        self._follow()
+        self._follow(PlanarPose(float(scan.origin[0]), float(scan.origin[1]), 0.0))
 
     def grid(self) -> OccupancyGrid | None:
         if self.voxels.empty or self.floor is None or self.T_odom_map is None:
@@ -295,8 +295,8 @@ class VoxelGridMapper:
         back = self._T_odom_map.to(PlanarPose(0.0, 0.0, 0.0)).matrix()
         return StoredMap(own.origin, own.resolution, own.cells, voxels @ back[:3, :3].T + back[:3, 3], places)
 
-    def _follow(self) -> None:
-        """Find the place in the map from before at first, and correct it from time to time."""
+    def _follow(self, here: PlanarPose) -> None:
+        """Find the place in the map from before at first, and correct it from time to time; the robot is `here`."""
         if self._marks is None or self._t - self._followed < self.config.follow or len(self._newest) < FEWEST:
             return
         self._followed = self._t
@@ -306,7 +306,7 @@ class VoxelGridMapper:
             return
         T_map_odom = self._T_odom_map.to(PlanarPose(0.0, 0.0, 0.0))
         match = self._marks.refine(self._newest, T_map_odom)
-        off = T_map_odom.to(match.pose)
+        off = (T_map_odom @ here).to(match.pose @ here)
         if match.share >= FIT and math.hypot(off.x, off.y) < FAR_OFF and abs(off.yaw) < 0.1:
             self._place(match, self.config.gain)
 
