@@ -71,6 +71,15 @@ def test_a_map_that_cannot_be_kept_is_said() -> None:
     assert "cannot be written" in result.reason
 
 
+@pytest.mark.parametrize("most", [0, 3], ids=["on the way home", "on the way out"])
+def test_the_map_is_kept_where_the_trip_fails(tmp_path: Path, most: int) -> None:
+    robot = Explorer(offset=0.0, silent=1.0)
+    skill = Explore(KeptFileConfig(str(tmp_path)))
+    result = outcome(robot.run(skill.run(robot.context, ExploreGoal(most=most, save="hall")), 60.0))
+    assert (result.success, result.slot) == (False, "odometry") and "silent" in result.reason
+    assert result.reason.endswith(f"The map is in {tmp_path / 'hall'}.yaml.") and robot.twist == Twist()
+
+
 @pytest.mark.parametrize("at", [0.05, 4.0, 12.0])
 def test_cancelled_at_any_stage_it_stands_and_stays(at: float) -> None:
     robot = Explorer()

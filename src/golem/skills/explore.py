@@ -56,6 +56,7 @@ class Explore(KeepsFiles):
     """Map the hall by walking to where the map ends, come home, and keep the map if asked to.
 
     Stages (see `Skill`): `locate`, `explore`, `home`, `save`, `done`. A frontier that cannot be reached is left out.
+    Where the legs or the way home fail, the map is kept all the same.
     """
 
     Goal = ExploreGoal
@@ -65,16 +66,24 @@ class Explore(KeepsFiles):
         return goal.timeout + LEG + LOOK + 2.0 * LEG + FIRST_MAP + SAVING + MARGIN
 
     async def run(self, context: Context, goal: ExploreGoal) -> SkillResult:
-        with standing_after_failure(context):
-            return await self._explore(context, goal)
-
-    async def _explore(self, context: Context, goal: ExploreGoal) -> SkillResult:
         start, path = context.t, self._file(goal.save) if goal.save else None
         await context.until(lambda: context.legs.reporting, FIRST_REPORT)
         context.legs.check_walking()
         if not await context.until(lambda: context.mapped, FIRST_MAP):
             context.legs.check_located()
             raise StageFailed("locate", "mapper", f"There is no map after {FIRST_MAP:g} s.")
+        try:
+            with standing_after_failure(context):
+                text = await self._tour(context, goal, start)
+        except StageFailed as failure:
+            saved = await self._save(context, path) if path else ""
+            raise StageFailed(failure.stage, failure.slot, f"{failure}{saved}") from failure
+        text += await self._save(context, path) if path else ""
+        context.say("done", text)
+        return SkillResult(True, "done", None, text, {"explore": context.t - start})
+
+    async def _tour(self, context: Context, goal: ExploreGoal, start: float) -> str:
+        """Go from frontier to frontier, and home; returns what came of it."""
         home, given_up, visited = self._here(context), list[PlanarPose](), 0
         while visited < goal.most and context.t - start < goal.timeout:
             target = self._next(context, given_up)
@@ -91,10 +100,7 @@ class Explore(KeepsFiles):
             await context.sleep(LOOK)
         context.say("home", f"{visited} frontiers seen; going home.")
         result = await go_to(context, home, "map", 2.0 * LEG, "home")
-        saved = await self._save(context, path) if path else ""
-        text = f"{visited} frontiers seen in {context.t - start:.0f} s. {result.reason}{saved}"
-        context.say("done", text)
-        return SkillResult(True, "done", None, text, {"explore": context.t - start})
+        return f"{visited} frontiers seen in {context.t - start:.0f} s. {result.reason}"
 
     def _file(self, name: str) -> Path:
         """Return the path of a map without its ending. Raises ConfigError: something else has one of its names."""
