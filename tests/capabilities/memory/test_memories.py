@@ -134,3 +134,8 @@ def test_words_name_labels(text: str, found: dict[str, float]) -> None:
     scores = label_scores(text, ("screw", "screw_hole", "mug", "bottle", "can"))
     assert set(scores) == set(found)
     assert all(math.isclose(scores[label], score) for label, score in found.items())
+
+
+@pytest.mark.parametrize(("text", "label"), [("ключ", "Ключ"), ("große Tasse", "GROSSE_TASSE"), ("扳手", "扳手")])
+def test_words_of_any_script_name_their_label(text: str, label: str) -> None:
+    assert label_scores(text, (label, "mug", "große", "螺丝")) == {label: 1.0}

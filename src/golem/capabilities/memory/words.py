@@ -16,7 +16,7 @@ SAME, SYNONYM, WITHIN = 1.0, 0.9, 0.7
 
 @lru_cache(maxsize=4096)
 def _normal(text: str) -> str:
-    words = re.findall(r"[a-z0-9]+", text.lower())
+    words = re.findall(r"[^\W_]+", text.casefold())
     return " ".join(word[:-1] if len(word) > 3 and word.endswith("s") and word[-2] != "s" else word for word in words)
 
 
