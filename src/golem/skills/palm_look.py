@@ -168,6 +168,8 @@ class PalmLook:
         """
         c, context = self._config, self._context
         scene, seen_way = context.scene("head"), way
+        if not len(target.points):
+            target = replace(target, points=target.position[None], mask=None)
         size, eye = _size(target.points), context.T_odom_base[:2, 3]
         for k in range(c.looks):
             await self._motion.to({self._side: self._watching(target, way, yaw)}, c.travel_speed, near=NEAR)
