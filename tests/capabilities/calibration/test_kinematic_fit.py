@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from golem.capabilities.calibration.kinematic_fit import ARM, PIXEL, TagView, fit
+from golem.capabilities.calibration.kinematic_fit import ARM, PIXEL, VIEWS, TagView, ViewProblem, fit, solve
 from golem.capabilities.calibration.view_postures import view_postures
 from golem.errors import ConfigError
 from golem.robots.model.magpie_model import cuff_tags, hand_name, tag_corners
@@ -83,6 +83,24 @@ def test_one_hand_does_not_do() -> None:
     of_left = [v for v in views(8, np.eye(4), np.zeros(NUM_JOINTS), 0) if v.side == "left"]
     with pytest.raises(ConfigError, match="right hand's tags were seen in 0 postures"):
         fit(of_left, HEAD)
+
+
+class Shifted(ViewProblem):
+    """Every tag is at one place in the image, the unknown."""
+
+    scale = np.full(2, 100.0)
+
+    def pixels(self, x: Array) -> Array:
+        return np.concatenate([(x - c).ravel() for view in self.views for c in view.corners.values()])
+
+
+def test_views_of_a_hand_that_contradict_each_other_are_no_calibration() -> None:
+    agree = [TagView("left", np.zeros(NUM_JOINTS), {0: np.full((4, 2), 7.0)})] * VIEWS
+    odd = [TagView("right", np.zeros(NUM_JOINTS), {0: np.full((4, 2), 50.0 * (i + 1))}) for i in range(VIEWS)]
+    assert solve(Shifted(agree, HEAD))[0] == pytest.approx([7.0, 7.0], abs=0.01)
+    for given in ([*agree, *odd], odd):
+        with pytest.raises(ConfigError, match="Only . views of the right hand's tags agree"):
+            solve(Shifted(given, HEAD))
 
 
 def test_postures_are_seen_free_and_apart() -> None:

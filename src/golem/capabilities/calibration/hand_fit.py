@@ -34,7 +34,7 @@ def fit_hand(views: Sequence[TagView], camera: Side, info: CameraInfo, zero: flo
         zero: standard deviation of what the arms' zeros are off by [rad].
 
     Raises:
-        ConfigError: too few views.
+        ConfigError: too few views, or they are at odds.
     """
     if len(views) < VIEWS:
         raise ConfigError(

@@ -60,7 +60,7 @@ class TagView:
 
 
 def fit(views: Sequence[TagView], info: CameraInfo) -> Calibration:
-    """Return the calibration that explains views of both hands best. Raises ConfigError: too few of a hand."""
+    """Return the calibration that explains views of both hands best. Raises ConfigError: too few that agree."""
     for side in SIDES:
         n = sum(view.side == side for view in views)
         if n < VIEWS:
@@ -151,12 +151,19 @@ class ViewProblem(ABC):
 def solve(problem: ViewProblem) -> tuple[Array, Array, float]:
     """Return the likeliest unknowns (n,), their covariance (n, n), and the corners' error that is left, RMS [px].
 
-    Tags that the unknowns do not explain are left out.
+    Tags that the unknowns do not explain are left out. Raises ConfigError: too few views of a hand are left.
     """
+    shown = {view.side for view in problem.views}
     start = np.zeros(problem.size)
     rough = least_squares(problem.residuals, start, loss="cauchy", f_scale=OUTLIER, x_scale=problem.scale)
     # A tag that is partly hidden has corners where it has none.
     problem.keep(rough.x)
+    for side in sorted(shown):
+        if (n := sum(view.side == side for view in problem.views)) < VIEWS:
+            raise ConfigError(
+                f"Only {n} views of the {side} hand's tags agree with each other; {VIEWS} are the least: check that "
+                "its cuff sits as in the model, and that the camera is the one that its profile says."
+            )
     found = least_squares(problem.residuals, rough.x, x_scale=problem.scale)
     return found.x, np.linalg.inv(found.jac.T @ found.jac), float(np.sqrt(np.mean(problem.pixels(found.x) ** 2)))
 
