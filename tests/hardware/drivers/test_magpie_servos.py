@@ -260,21 +260,27 @@ def test_a_servo_that_shut_itself_down_is_left_alone(hand: Hand, bit: int, clear
     assert hand.reports[-1].t < hand.t - 0.9
 
 
-def test_another_gap_ends_a_shutdown(hand: Hand) -> None:
-    shut_down(hand, hand.b, 0x20)
-    hand.b.error = 0
+@pytest.mark.parametrize("servo", [1, 2])
+@pytest.mark.parametrize("clears", [False, True], ids=["its error stays", "its error goes"])
+def test_another_gap_ends_a_shutdown(hand: Hand, servo: int, clears: bool) -> None:
+    down = hand.bus.servos[servo]
+    shut_down(hand, down, 0x20)
+    down.error = 0 if clears else 0x20
     hand.driver.command(HandCommand(0.0, 0.0, 9.0))  # the same gap with another force is no new command
     for _ in range(50):
         hand.t += DT
         with pytest.raises(HandFault, match="overload"):
             hand.driver.step(hand.t)
         hand.bus.step(hand.t, DT)
-    assert hand.b.word(34) == 0
+    assert down.word(34) == 0
     hand.controller.open(0.08)
     hand.run(0.05)
+    assert down.word(34) > 0
+    down.error = 0  # where it stayed, it stayed until it was written to
+    hand.run(0.02)
     hand.faults.clear()
     hand.run(0.05)
-    assert hand.b.word(34) > 0 and not hand.faults and hand.reports[-1].t > hand.t - 0.02
+    assert not hand.faults and hand.reports[-1].t > hand.t - 0.02
 
 
 def test_power_that_was_off_ends_a_shutdown(hand: Hand) -> None:

@@ -209,7 +209,8 @@ class _Finger:
         """Take the errors of an answer, and what the servo says that it was told."""
         told, own = packet.parameters[:TOLD_SIZE], self.settings[6:]
         limp = not any(told[4:6])
-        down = bool(packet.error & SHUTDOWN) or (limp and self._taken)
+        # Its error stays until it is written to: before it has taken a new goal it says nothing of that one.
+        down = self._taken and (limp or bool(packet.error & SHUTDOWN))
         if down or not limp:  # one that has torque, and says nothing of an error, was without power
             self.shut = down
         self._taken |= told == own
