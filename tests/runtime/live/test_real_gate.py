@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
@@ -15,11 +16,12 @@ from golem.middleware.dds.base import Qos
 from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.dds.local import LocalReader
 from golem.middleware.ros.msgs.std_srvs import Trigger_Request
+from golem.middleware.ros.node import RosNode
 from golem.middleware.wire import convert as wire
 from golem.middleware.wire import hg
 from golem.middleware.wire.api import ApiRequest, RpcServer
 from golem.robots.unitree import loco_service
-from golem.runtime.live import motion_switcher_client
+from golem.runtime.live import motion_switcher_client, operator
 from golem.runtime.live.safety_arrivals import Arrivals
 from golem.runtime.live.safety_main import SafetyConfig, run_safety
 from golem.runtime.live.safety_process import LOOK, WARY, SafetyProcess
@@ -45,7 +47,7 @@ def test_a_real_robots_motors_are_not_touched_before_its_own_controller_lets_go_
     assert live.gate is not None
     participant, node = live.member("listener")
     motors = participant.reader("rt/lowcmd", hg.LOW_CMD.type_name, Qos(reliable=False, depth=1000))
-    live.run(0.2)
+    live.run(1.2)
     assert (live.state, live.reason) == (GateState.INIT, "motors_held") and not motors.take(1000)
     assert "'ai'" in live.gate.status.detail and "golem safety take --hanging" in live.gate.status.detail
     assert not live.ask("activate")[0]
@@ -64,6 +66,26 @@ def test_a_real_robots_motors_are_not_touched_before_its_own_controller_lets_go_
     live.run(0.1)
     assert not motors.take(1000)  # not even to damp them
     live.leave_quietly(node)
+
+
+def test_whoever_has_the_motors_hides_nothing_else_that_is_missing(live: Live, monkeypatch: pytest.MonkeyPatch) -> None:
+    def until(node: RosNode, condition: Callable[[], bool], timeout: float) -> bool:
+        live.run(1.0, lambda: bool(node.poll()) or condition())
+        return condition()
+
+    monkeypatch.setattr(operator, "until", until)
+    live.leave("safety")
+    live.start_gate(real=True)
+    live.run(1.2)
+    assert live.reason == "motors_held"
+    assert live.ask("press")[0]
+    live.run(0.1)
+    assert (live.state, live.reason) == (GateState.INIT, "estop_pressed")  # what the bring-up waits for
+    with pytest.raises(ConfigError, match="would not damp the motors: estop_pressed"):
+        operator._take(*live.member("operator"), operator.TakeConfig(hanging=True))
+    assert live.ask("release")[0]
+    live.run(0.1)
+    assert live.reason == "motors_held"
 
 
 def test_a_button_pressed_before_the_activation_leaves_the_motors_damped(live: Live) -> None:
@@ -102,7 +124,7 @@ def test_a_motion_switcher_that_falls_silent_keeps_the_gate_shut_but_stops_nobod
     assert not live.ask("reset")[0]
     live.leave("safety")
     live.start_gate(real=True)
-    live.run(0.5)
+    live.run(1.2)
     assert (live.state, live.reason) == (GateState.INIT, "motors_held")
     assert live.gate is not None and "does not say" in live.gate.status.detail
 
@@ -113,7 +135,7 @@ def test_a_controller_whose_name_cannot_be_printed_has_the_motors_all_the_same(
     live.leave("safety")
     live.start_gate(real=True)
     assert live.gate is not None
-    live.run(0.2)
+    live.run(1.2)
     reply = RpcServer.reply
     nonsense = '{"form": "0", "name": "\\ud800"}'
     monkeypatch.setattr(RpcServer, "reply", lambda server, said: reply(server, replace(said, data=nonsense)))

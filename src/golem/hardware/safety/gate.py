@@ -198,8 +198,8 @@ class Gate:
 
 
 def _strictest(faults: list[Fault | None]) -> Fault | None:
-    """Return the first fault in spite of which nobody stands, or else the first."""
-    known = [fault for fault in faults if fault is not None]
+    """Return the first fault in spite of which nobody stands, or else the first; what else is missing before HELD."""
+    known = sorted((fault for fault in faults if fault is not None), key=lambda fault: fault.reason is Reason.HELD)
     return next((fault for fault in known if not _stands(fault)), known[0] if known else None)
 
 
