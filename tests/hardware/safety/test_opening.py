@@ -42,6 +42,18 @@ def test_what_does_not_hold_the_robot_where_it_is_activates_nothing(
     assert (result.state, result.reason) == (GateState.ARMED, Reason.COMMAND_AWAY)
 
 
+@pytest.mark.parametrize("again", [False, True], ids=["a new command", "the command of before"])
+def test_whoever_is_activated_holds_on_from_the_first_command(again: bool, bench: Any, command_at: Make) -> None:
+    held = command_at(bench.t + 0.002)
+    bench.tick(command=held)
+    asked = {"command": held} if again else {}
+    assert bench.tick(request=OperatorRequest.ACTIVATE, **asked).state is GateState.ACTIVE
+    for _ in range(3):
+        limp = command_at(bench.t + 0.002, kp=np.zeros(27), kd=np.zeros(27))
+        result = bench.tick(command=limp)
+    assert (result.state, result.reason) == (GateState.STOP1, Reason.COMMAND_GAINS)
+
+
 def test_a_reset_waits_a_second_and_for_rest(bench: Any, state_at: Make) -> None:
     bench.activate()
     bench.tick(estop=PRESSED)

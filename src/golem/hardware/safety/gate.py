@@ -344,13 +344,13 @@ def _command(
     new: LowCommand | None, memory: GateMemory, t: float, limits: SafetyLimits, carries: bool
 ) -> tuple[LowCommand | None, SenderMemory, float, Fault | None]:
     old, active = memory.command, memory.mode is GateState.ACTIVE
-    sender, prompt = (memory.sender, memory.prompt) if active else (SenderMemory(), t)
+    sender, prompt = memory.sender, memory.prompt if active else t
     if new is not None:
         if not _stamped(new.t, t, limits):
             return old, sender, prompt, Fault(Reason.COMMAND_TIME, f"stamp {new.t} at {t}")
         if old is None or new.t > old.t:
             late = active and t - memory.since > limits.grace
-            sender, followed, fault = examine_command(new, sender, limits, carries, late)
+            sender, followed, fault = examine_command(new, sender if active else SenderMemory(), limits, carries, late)
             if fault is not None:
                 return (old if fault.reason is Reason.COMMAND_INVALID else new), sender, prompt, fault
             old = new if followed or old is None else replace(old, t=new.t)
