@@ -9,9 +9,13 @@ from typing import Any, cast
 import pytest
 
 from golem.errors import ConfigError
+from golem.middleware.ros.future import RosError
 from golem.runtime.bringup.base import BringupConfig, BringupStep, StepFinding, StepRefused, Task, Workbench
 from golem.runtime.bringup.bringup_command import CHECKS, FILE, BringupReport, run_checks
 from golem.runtime.bringup.motor_checks import check_motion
+
+REFUSALS = {"refuses": StepRefused("the gate has ended"), "asks in vain": RosError("NOT STOPPED: press the button")}
+"""What checks raise, by name."""
 
 
 class Nobody:
@@ -42,8 +46,8 @@ def checks(done: list[str], outcomes: dict[str, bool], lasting: str = "") -> tup
     def make(name: str) -> BringupStep:
         def run(_: Workbench) -> StepFinding:
             done.append(name)
-            if name == "refuses":
-                raise StepRefused("the gate has ended")
+            if name in REFUSALS:
+                raise REFUSALS[name]
             return StepFinding(outcomes[name], f"about {name}", {"figure": 1.5})
 
         return BringupStep(name, f"Title of {name}", run, lasting=name == lasting)
@@ -101,10 +105,11 @@ def test_nothing_moves_before_a_person_says_so(tmp_path: Path) -> None:
     assert not finding.passed and "nobody says that the robot may move" in finding.text
 
 
-def test_a_refusal_fails_its_check(tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", REFUSALS)
+def test_a_refusal_fails_its_check(name: str, tmp_path: Path) -> None:
     report = BringupReport(tmp_path, "domain 1")
-    assert not run_checks(bench(), report, checks([], {"refuses": True}), again=())
-    assert "the gate has ended" in (tmp_path / FILE).read_text()
+    assert not run_checks(bench(), report, checks([], {name: True}), again=())
+    assert str(REFUSALS[name]) in (tmp_path / FILE).read_text()
 
 
 def test_a_report_of_another_robot_or_none_is_refused(tmp_path: Path) -> None:

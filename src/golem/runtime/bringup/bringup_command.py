@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from golem import __version__
-from golem.errors import ConfigError, unknown_name
+from golem.errors import ConfigError, GolemError, unknown_name
 from golem.output_file import write_file
 from golem.robots.model.pinocchio_model import Kinematics
 from golem.robots.model.spatial import skew
@@ -313,8 +313,8 @@ def run_checks(
         tell(f"{head} ...")
         try:
             finding = check.run(bench)
-        except base.StepRefused as refusal:
-            finding = base.StepFinding(False, str(refusal))
+        except GolemError as error:
+            finding = base.StepFinding(False, str(error))
         report.add(check.name, finding)
         tell(f"{head}: {'passed' if finding.passed else 'FAILED'}: {finding.text}.")
         if not finding.passed:
