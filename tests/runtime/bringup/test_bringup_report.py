@@ -6,13 +6,17 @@ import json
 from pathlib import Path
 from typing import Any, cast
 
+import numpy as np
 import pytest
 
 from golem.errors import ConfigError
 from golem.middleware.ros.future import RosError
+from golem.middleware.wire.convert import encode_low_state
 from golem.runtime.bringup.base import BringupConfig, BringupStep, StepFinding, StepRefused, Task, Workbench
 from golem.runtime.bringup.bringup_command import CHECKS, FILE, BringupReport, run_checks
+from golem.runtime.bringup.listening_checks import check_state
 from golem.runtime.bringup.motor_checks import check_motion
+from golem.types import NUM_JOINTS, TICK, Imu, LowState
 
 REFUSALS = {"refuses": StepRefused("the gate has ended"), "asks in vain": RosError("NOT STOPPED: press the button")}
 """What checks raise, by name."""
@@ -110,6 +114,27 @@ def test_a_refusal_fails_its_check(name: str, tmp_path: Path) -> None:
     report = BringupReport(tmp_path, "domain 1")
     assert not run_checks(bench(), report, checks([], {name: True}), again=())
     assert str(REFUSALS[name]) in (tmp_path / FILE).read_text()
+
+
+@pytest.mark.parametrize(("earlier", "late", "passes"), [(500, 0, True), (0, 100, False)])
+def test_only_states_that_are_damaged_while_it_listens_count(earlier: int, late: int, passes: bool) -> None:
+    class Link:
+        damaged = earlier
+
+        def spin(self, *_: Any) -> bool:
+            return True
+
+        def listen(self, seconds: float) -> list[tuple[float, LowState]]:
+            self.damaged += late
+            zero, imu = np.zeros(NUM_JOINTS), Imu(np.eye(4)[0], np.zeros(3), np.array([0.0, 0.0, 9.81]))
+            states = [LowState(k * TICK, zero, zero, zero, imu) for k in range(1500)]
+            self.payload = encode_low_state(states[-1])
+            return [(state.t, state) for state in states]
+
+    at = bench()
+    at.link = cast(Any, Link())
+    finding = check_state(at)
+    assert finding.passed == passes and finding.figures["unreadable states"] == late, finding.text
 
 
 def test_a_report_of_another_robot_or_none_is_refused(tmp_path: Path) -> None:

@@ -70,9 +70,10 @@ def check_state(bench: Workbench) -> StepFinding:
     """The state comes at its rate, lives, and what it says can be true."""
     link = bench.link
     link.spin(bench.config.patience, lambda: link.calm() and _turns([s for _, s in list(link.states)[-100:]]) <= STILL)
-    heard = link.listen(LISTEN)
+    before, heard = link.damaged, link.listen(LISTEN)
+    damaged = link.damaged - before
     if len(heard) < 100:
-        return StepFinding(False, f"{len(heard)} states in {LISTEN:g} s, and {link.damaged} that cannot be read")
+        return StepFinding(False, f"{len(heard)} states in {LISTEN:g} s, and {damaged} that cannot be read")
     states = [s for _, s in heard]
     robot, ours = states[-1].t - states[0].t, heard[-1][0] - heard[0][0]
     rate, lost = robot / ours, 1.0 - (len(states) - 1) / (FREQUENCY * robot)
@@ -82,7 +83,7 @@ def check_state(bench: Workbench) -> StepFinding:
     figures: dict[str, float | str] = {
         "states per second of the robot's time": round((len(states) - 1) / robot, 1),
         "robot's time by ours": round(rate, 3),
-        "unreadable states": float(link.damaged),
+        "unreadable states": float(damaged),
         "specific force [m/s^2]": round(float(np.linalg.norm(force)), 2),
         "mean rate [rad/s]": round(spin, 4),
         "lean [deg]": round(float(np.degrees(lean)), 1),
@@ -95,8 +96,8 @@ def check_state(bench: Workbench) -> StepFinding:
     fault = next((f for f in (watch.add(reports) for _ in range(10)) if f is not None), None)
     out = np.flatnonzero((states[-1].q < limits.state_lower) | (states[-1].q > limits.state_upper))
     wrong = ""
-    if link.damaged > 0.02 * len(heard):
-        wrong = f"{link.damaged} states cannot be read: checksum, or another firmware"
+    if damaged > 0.02 * len(heard):
+        wrong = f"{damaged} states cannot be read: checksum, or another firmware"
     elif lost > LOST:
         wrong = f"{100 * lost:.0f} % of the states are lost, or its tick is no millisecond"
     elif bench.config.dds.robot and not 0.98 <= rate <= 1.02:
