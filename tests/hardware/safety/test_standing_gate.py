@@ -97,6 +97,16 @@ def test_what_makes_standing_impossible_damps(
     assert not result.command.kp.any() and (result.command.kd > 0.0).all()
 
 
+def test_a_gate_that_stood_and_was_held_up_damps(standing: Any, limits: SafetyLimits, command_at: Make) -> None:
+    standing.tick(command=nan(command_at, standing.t + 0.002))
+    assert standing.tick(command=None).state is GateState.STOP2
+    standing.t += limits.stall - 0.01
+    assert standing.tick(command=None).state is GateState.STOP2
+    standing.t += limits.stall
+    result = standing.tick(command=None)
+    assert (result.state, result.reason) == (GateState.STOP1, Reason.STALLED)
+
+
 def test_a_fault_of_the_arms_leaves_it_standing_and_one_of_the_legs_does_not(standing: Any, state_at: Make) -> None:
     for joint, state in ((16, GateState.STOP2), (3, GateState.STOP1)):
         standing.gate.gate.memory = standing.results[-1].memory

@@ -254,7 +254,7 @@ def _stamped(t_frame: float, t: float, limits: SafetyLimits) -> bool:
 
 def _pause(memory: GateMemory, t: float, limits: SafetyLimits) -> Fault | None:
     pause = t - memory.t
-    if memory.mode is GateState.ACTIVE and pause > limits.stall:
+    if memory.mode in (GateState.ACTIVE, GateState.STOP2) and pause > limits.stall:
         return Fault(Reason.STALLED, f"for {pause * 1e3:.0f} ms")
     return None
 
