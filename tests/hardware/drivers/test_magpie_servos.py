@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import pytest
@@ -344,3 +345,18 @@ def test_a_command_that_is_no_number_is_refused(hand: Hand) -> None:
 def test_two_servos_cannot_have_one_id() -> None:
     with pytest.raises(ConfigError, match="each needs its own"):
         MagpieServoConfig("/dev/ttyUSB0", b=FingerConfig(1, 245.0, -1, 218.0, 304.0))
+
+
+@pytest.mark.parametrize(
+    ("options", "range_"),
+    [
+        ({"speed": 0}, "speed .* 1 to 1023, not 0"),
+        ({"margin": 256}, "margin .* 0 to 255, not 256"),
+        ({"slope": 1}, "slope .* 2 to 128, not 1"),
+        ({"a": FingerConfig(300, 150.0, 1, 85.0, 176.0)}, "id .* 0 to 253, not 300"),
+        ({"b": FingerConfig(2, 245.0, 0, 218.0, 304.0)}, "clockwise, -1"),
+    ],
+)
+def test_what_no_servo_can_be_told_is_refused_at_the_start(options: dict[str, Any], range_: str) -> None:
+    with pytest.raises(ConfigError, match=range_):
+        MagpieServoConfig("/dev/ttyUSB0", **options)

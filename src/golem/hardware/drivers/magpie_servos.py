@@ -26,7 +26,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from golem.errors import ConfigError, GolemError
-from golem.hardware.drivers.dynamixel import CHECKSUM_ERROR, StatusPacket, StatusParser, read_packet, sync_write_packet
+from golem.hardware.drivers.dynamixel import (
+    CHECKSUM_ERROR,
+    LAST_ID,
+    StatusPacket,
+    StatusParser,
+    read_packet,
+    sync_write_packet,
+)
 from golem.hardware.drivers.serial_port import PortError, SerialPort
 from golem.robots.model import magpie_model
 from golem.robots.model.magpie_model import MAX_FORCE
@@ -187,6 +194,17 @@ class MagpieServoConfig:
     def __post_init__(self) -> None:
         if self.a.id == self.b.id:
             raise ConfigError(f"The two servos of a hand have the id {self.a.id}; each needs its own.")
+        for name, value, least, most in (
+            ("id", self.a.id, 0, LAST_ID),
+            ("id", self.b.id, 0, LAST_ID),
+            ("speed", self.speed, 1, TICKS),
+            ("margin", self.margin, 0, 255),
+            ("slope", self.slope, 2, 128),
+        ):
+            if not least <= value <= most:
+                raise ConfigError(f"The {name} of a hand's servo is {least} to {most}, not {value}.")
+        if {abs(self.a.closes), abs(self.b.closes)} != {1}:
+            raise ConfigError("A finger closes by turning counter-clockwise, 1, or clockwise, -1.")
 
 
 class _Finger:
