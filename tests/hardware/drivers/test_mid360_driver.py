@@ -166,6 +166,11 @@ def test_a_port_that_is_taken_is_named(lidar: Mid360) -> None:
         Mid360("127.0.0.1", point_port=lidar.ports[0], imu_port=0)
 
 
+def test_a_port_that_is_none_is_named() -> None:
+    with pytest.raises(LidarError, match="port 70000: a port is 1 to 65535"):
+        Mid360("127.0.0.1", point_port=70000)
+
+
 @pytest.mark.slow
 def test_a_minute_of_points_loses_none_and_takes_a_quarter_of_a_core(lidar: Mid360, peer: Mid360Peer) -> None:
     used, scans, samples = 0.0, 0, 0

@@ -243,8 +243,9 @@ def _listen(host: str, port: int) -> socket.socket:
         listening.setblocking(False)
         listening.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER)
         listening.bind((host, port))
-    except OSError as error:
+    except (OSError, OverflowError) as error:
         listening.close()
-        text = f"Nobody can listen to the LiDAR at {host}, port {port}: {error.strerror}."
+        why = error.strerror if isinstance(error, OSError) else "a port is 1 to 65535"
+        text = f"Nobody can listen to the LiDAR at {host}, port {port}: {why}."
         raise LidarError(f"{text} Give an address of this machine, in the LiDAR's network.") from error
     return listening
