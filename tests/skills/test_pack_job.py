@@ -367,6 +367,21 @@ def test_words_of_a_gantry_that_say_nothing_are_left_out() -> None:
     assert (listens.at, listens.loosened) == ("A", set())
 
 
+def test_a_gantry_is_understood_where_a_listed_name_has_blanks(tmp_path: Path) -> None:
+    (tmp_path / "list.csv").write_text("class,x,y,z,name\nscrew,0.1,0.2,0,Cover  screw 7\nscrew,0.1,0.4,0,B\n")
+    names = {one.name for one in read_list(tmp_path / "list.csv", ())}
+    bus = Bus()
+    context = Context(bus, Kinematics(), 0.01, modules())
+    listens, at = Gantry(context, names), list[str]()
+    for k, name in enumerate(("Cover screw 7", "B", "Cover  screw 7")):
+        bus.publish(topics.REMOVALS, f"Remove: {name} with confidence = 0.9", float(k))
+        context.refresh(float(k))
+        bus.deliver(float(k))
+        listens()
+        at.append(listens.at)
+    assert at == ["Cover screw 7", "B", "Cover screw 7"] and listens.loosened == {"Cover screw 7", "B"}
+
+
 def test_frames_are_related_by_three_places_that_are_known_in_both() -> None:
     rng, truth = np.random.default_rng(0), PlanarPose(1.0, -2.0, 2.5)
     a = rng.uniform(-1.0, 1.0, (3, 2))

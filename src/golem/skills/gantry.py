@@ -9,7 +9,7 @@ from golem.interfaces import topics
 from golem.middleware.bus import News
 from golem.skills.context import Context
 
-SENTENCE = re.compile(r"\s*Remove: (\S{1,60}) with confidence = (\S{1,20})\s*")
+SENTENCE = re.compile(r"\s*Remove: (\S.{0,59}) with confidence = (\S{1,20})\s*")
 """On the topic `/triggered_behavior`."""
 KEEP_OFF = 0.9
 """Distance from where the gantry works at which nobody stands or reaches [m] [own]."""
@@ -32,10 +32,11 @@ class Gantry:
         self.at, self.loosened, self.t = "", set[str](), context.t
 
     def __call__(self) -> None:
-        said = SENTENCE.fullmatch((self._news.read() or "")[:100])
-        if said is not None and said[1] in self._names:
-            self.loosened |= {self.at} - {said[1], ""}
-            self.at, self.t = said[1], self._context.t
+        said = SENTENCE.fullmatch((self._news.read() or "")[:200])
+        name = " ".join(said[1].split()) if said else ""  # as in a list
+        if name in self._names:
+            self.loosened |= {self.at} - {name, ""}
+            self.at, self.t = name, self._context.t
 
     @property
     def silent(self) -> bool:
