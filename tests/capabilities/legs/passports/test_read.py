@@ -91,6 +91,34 @@ def mjlab(folder: Path, **changes: str) -> Path:
     return small(folder / "net.onnx", 47, 12, **notes | changes)
 
 
+@pytest.mark.parametrize("writer", [trainers.isaac_lab, trainers.unitree_deploy])
+def test_targets_about_another_posture_than_joints_are_seen_by_are_refused(
+    tmp_path: Path, writer: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(trainers, "write_network", lambda *_: None)  # what is read stands in the other file
+
+    def edit(data: dict[str, Any]) -> None:
+        actions = data["actions"]
+        action = actions[0] if isinstance(actions, list) else actions["JointPositionAction"]
+        action["offset"] = 0.0  # the joints are told from 0, and seen from default_joint_pos
+
+    with pytest.raises(ConfigError, match="offset is not the default_joint_pos, which the joints are seen relative"):
+        read_passport(writer(tmp_path, edit=edit))
+
+
+def test_isaac_targets_about_another_posture_do_where_joints_are_seen_as_they_are(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(trainers, "write_network", lambda *_: None)
+
+    def edit(data: dict[str, Any]) -> None:
+        data["actions"][0]["offset"] = 0.0
+        for term in data["observations"]["policy"]:
+            term["full_path"] = term["full_path"].replace("joint_pos_rel", "joint_pos")
+
+    assert not any(read_passport(trainers.isaac_lab(tmp_path, edit=edit)).description.posture)
+
+
 def test_the_metadata_of_later_versions_are_read(tmp_path: Path) -> None:
     path = mjlab(
         tmp_path,

@@ -49,7 +49,11 @@ def read(path: Path, data: Mapping[str, Any], network: Path | None) -> base.Pass
     if any(t.term == "orientation" for t in terms):
         assumed.append("Quaternions are w, x, y, z, as before Isaac Lab 3.")
     offset = base.numbers("offset of the action", action.get("offset", 0.0), m)
-    at_rest = dict(zip(names, posture, strict=True)) | dict(zip(moved, offset, strict=True))
+    default = dict(zip(names, posture, strict=True))
+    at_rest = default | dict(zip(moved, offset, strict=True))
+    apart = any(abs(at_rest[name] - default.get(name, 0.0)) > 1e-3 for name in at_rest)
+    if apart and any(t.term == "joint_position" for t in terms):
+        raise ConfigError("The action's offset is not the default_joint_pos, which the joints are seen relative to.")
     description = Description(
         network="policy.onnx",
         observation=terms,
