@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -203,6 +204,26 @@ def test_the_robot_of_another_file_stands_on_the_same_floor(tmp_path: Path) -> N
     assert load(other) == pytest.approx(weight(other), rel=0.02)
     assert other.truth.touches() == ()
     other.close()
+
+
+@pytest.mark.parametrize("share", [0.5, 2.0])
+@pytest.mark.parametrize("where", ["motor", "joint"])
+def test_the_torque_limits_of_another_file_are_its_own_and_what_is_reported_acts(
+    where: str, share: float, tmp_path: Path
+) -> None:
+    spec = mujoco.MjSpec.from_string(export_mjcf(hands=False))
+    limits = {motor.name: share * float(motor.ctrlrange[1]) for motor in spec.actuators}
+    for motor in spec.actuators:
+        bounds = [-limits[motor.name], limits[motor.name]]
+        spec.joint(motor.name).actfrcrange = bounds
+        motor.ctrlrange, motor.ctrllimited = bounds, where == "motor"
+    (tmp_path / "robot.xml").write_text(spec.to_xml())
+    robot = twin(mjcf=str(tmp_path / "robot.xml"))
+    robot.advance(replace(LIMP, tau=np.full(27, 1e4)), {}, TICK)
+    np.testing.assert_allclose(robot.joints()[2], list(limits.values()))
+    acting = [robot.data.qfrc_actuator[robot.scene.model.joint(name).dofadr[0]] for name in limits]
+    np.testing.assert_allclose(acting, list(limits.values()))
+    robot.close()
 
 
 @pytest.mark.parametrize("world", ["open", "slope"])

@@ -24,7 +24,7 @@ from golem.robots.mujoco.config import WORKSHOPS, MujocoConfig, Support
 from golem.robots.mujoco.external_forces import Hoist, Pushes
 from golem.robots.mujoco.hand_servos import HandServos
 from golem.robots.mujoco.lidar_sensor import LidarMoment, LidarSensor
-from golem.robots.mujoco.motors import Motors
+from golem.robots.mujoco.motors import Motors, torque_limits
 from golem.robots.mujoco.scene import COARSE_STEP, FINE_STEP, Scene, build_scene, nominal_layout
 from golem.robots.mujoco.truth import Truth
 from golem.robots.sensors.cameras import CAMERAS
@@ -93,7 +93,7 @@ class MujocoRobot:
         self._pushes = Pushes(model, memory["pushes"])
         self._motors = Motors(
             model,
-            load_limits(self.config.torque_profile).torque,
+            torque_limits(model, load_limits(self.config.torque_profile).torque),
             self._errors.joint_offset,
             self.profile.actuator_delay + self.config.latency,
             memory["motors"],

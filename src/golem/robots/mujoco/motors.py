@@ -167,6 +167,19 @@ def _pushes(m: Record, i: int, dt: float) -> bool:
     return touches
 
 
+def torque_limits(model: mujoco.MjModel, otherwise: Array) -> Array:
+    """Return the most that each motor of `model` gives, (27,) [N m]: `otherwise` (27,) where the model does not say."""
+    motors, joints = slice(NUM_JOINTS), model.actuator_trnid[:NUM_JOINTS, 0]
+    out = np.full(NUM_JOINTS, np.inf)
+    for limited, span in (
+        (model.actuator_ctrllimited[motors], model.actuator_ctrlrange[motors, 1]),
+        (model.actuator_forcelimited[motors], model.actuator_forcerange[motors, 1]),
+        (model.jnt_actfrclimited[joints], model.jnt_actfrcrange[joints, 1]),
+    ):
+        out = np.where(limited, np.minimum(out, span), out)
+    return np.where(np.isinf(out), otherwise, out)
+
+
 class Motors:
     """Drives of the model's first 27 actuators; `tau` (27,) is of the last step [N m], `memory` a `MOTORS`."""
 
