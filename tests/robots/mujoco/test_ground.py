@@ -268,6 +268,11 @@ def test_a_file_that_is_no_such_robot_is_refused(tmp_path: Path) -> None:
     file.write_text("<mujoco><worldbody><body name='pelvis'/></worldbody></mujoco>")
     with pytest.raises(ConfigError, match="27|vendor's order"):
         twin(mjcf=str(file))
+    spec = mujoco.MjSpec.from_string(export_mjcf(hands=False))
+    spec.delete(spec.joint("base"))  # bolted to the ground
+    file.write_text(spec.to_xml())
+    with pytest.raises(ConfigError, match="the link pelvis on a free joint"):
+        twin(mjcf=str(file))
 
 
 @pytest.mark.parametrize(

@@ -232,10 +232,11 @@ def read_robot(path: Path) -> mujoco.MjSpec:
         raise ConfigError(f"The robot's MJCF '{path}' cannot be read: {error}.") from error
     base = spec.body(BASE_LINK)
     motors = tuple(actuator.name for actuator in spec.actuators)
-    if base is None or spec.site("imu") is None or motors != JOINT_NAMES or spec.compiler.degree:
+    known = spec.site("imu") is not None and motors == JOINT_NAMES and not spec.compiler.degree
+    if not known or base is None or [j.type for j in base.joints] != [mujoco.mjtJoint.mjJNT_FREE]:
         raise ConfigError(
-            f"'{path}' is not the robot: it takes the link {BASE_LINK}, a site imu, angles in radians, and the motors "
-            f"{JOINT_NAMES[0]} to {JOINT_NAMES[-1]} in the vendor's order."
+            f"'{path}' is not the robot: it takes the link {BASE_LINK} on a free joint, a site imu, angles in radians, "
+            f"and the motors {JOINT_NAMES[0]} to {JOINT_NAMES[-1]} in the vendor's order."
         )
     base.joints[0].name = "base"
     return spec
