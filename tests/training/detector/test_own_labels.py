@@ -81,6 +81,12 @@ def test_one_command_makes_weights_that_the_localizer_takes(tmp_path: Path, caps
     with pytest.raises(ConfigError, match="is of other classes"):
         (tmp_path / "caps").mkdir()
         main(["--labels", str(coco(tmp_path / "caps")), "--out", str(tmp_path / "run"), "--steps", "2"])
+    again = ["--labels", str(folder), "--out", str(tmp_path / "run"), "--steps", "2"]
+    with pytest.raises(ConfigError, match="is of another seed"):
+        main([*again, "--seed", "1"])
+    yolo(folder, 12)  # more images: what was held out before may train now
+    with pytest.raises(ConfigError, match="is of other images or labels"):
+        main(again)
 
 
 def test_whatever_is_wrong_is_one_sentence(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ import csv
 import json
 import math
 import time
+import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -245,6 +246,7 @@ def train(config: TrainDetectorConfig, stop: int | None = None) -> Path:
     return fit(config, load(config.data, "train"), stop)
 
 
+OTHER = {"classes": "other classes", "images": "other images or labels", "seed": "another seed"}
 RUN = 32
 """Images of one world, which are set apart together: pictures of one place are no test for each other."""
 
@@ -260,10 +262,14 @@ def set_apart(data: Sequence[Labelled], most: int) -> tuple[list[Labelled], list
 
 
 def fit(config: TrainDetectorConfig, data: Sequence[Labelled], stop: int | None = None) -> Path:
-    """Train or resume on images in memory; see `train`. Raises ConfigError: a run of other classes is there."""
+    """Train or resume on images in memory; see `train`. Raises ConfigError: a run of something else is there."""
     torch.set_num_threads(1)
     torch.manual_seed(config.seed)
     config.out.mkdir(parents=True, exist_ok=True)
+    shown = 0
+    for one in data:
+        shown = zlib.crc32(one.labels.tobytes(), zlib.crc32(one.image.tobytes(), shown))
+    ran = {"classes": list(config.classes), "images": shown, "seed": config.seed}
     data, choice = set_apart(data, config.check_images)
     keys = [(camera, label) for camera in sorted({one.camera for one in choice}) for label in config.classes]
     model = PartNet(len(config.classes))
@@ -276,8 +282,9 @@ def fit(config: TrainDetectorConfig, data: Sequence[Labelled], stop: int | None 
     last_path, best_path, curve_path = (config.out / n for n in ("last.pt", "best.pt", "curve.csv"))
     if last_path.exists():
         state = torch.load(last_path, map_location=config.device, weights_only=True)
-        if state["classes"] != list(config.classes):
-            raise ConfigError(f"The run in {config.out} is of other classes; name another folder with --out.")
+        for what, mine in ran.items():
+            if state.get(what, mine) != mine:
+                raise ConfigError(f"The run in {config.out} is of {OTHER[what]}; name another folder with --out.")
         model.load_state_dict(state["model"])
         average.load_state_dict(state["average"])
         optimiser.load_state_dict(state["optimiser"])
@@ -318,9 +325,7 @@ def fit(config: TrainDetectorConfig, data: Sequence[Labelled], stop: int | None 
             quality = float(np.mean(by_key))
             print(f"step {step}: loss {means.round(3)}, mean AP {quality:.3f}", flush=True)
             better, best = quality > best, max(best, quality)
-            kept: dict[str, object] = {
-                "average": average.state_dict(), "step": step, "best": best, "classes": list(config.classes),
-            }  # fmt: skip
+            kept: dict[str, object] = {"average": average.state_dict(), "step": step, "best": best, **ran}
             if better:
                 _save(best_path, kept)
             _save(last_path, {**kept, "model": model.state_dict(), "optimiser": optimiser.state_dict()})
