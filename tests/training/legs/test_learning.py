@@ -113,6 +113,9 @@ def test_rows_of_the_curve_that_are_learned_again_are_left_out(tmp_path: Path) -
         file.write((tmp_path / CURVE).read_text().splitlines()[-1].replace("3840", "5760", 1) + "\n")
     train(small(tmp_path, updates=30))
     assert read_curve(tmp_path)["steps"].tolist() == pytest.approx([192 * k for k in range(1, 31)], rel=1e-4)
+    (tmp_path / CHECKPOINT).unlink()  # it was killed before the first one
+    train(small(tmp_path, updates=10))
+    assert read_curve(tmp_path)["steps"].tolist() == pytest.approx([192 * k for k in range(1, 11)], rel=1e-4)
 
 
 def test_a_run_that_begins_with_anothers_networks_draws_its_own_noise(

@@ -110,8 +110,10 @@ def train(config: TrainLegsConfig) -> Path:
     with closing(_Run(config)) as run:
         if path.exists():
             run.load(path)
-        elif config.start is not None:
-            run.begin_with(config.start)
+        else:
+            if config.start is not None:
+                run.begin_with(config.start)
+            (config.out / CURVE).unlink(missing_ok=True)  # of a run that died before its first checkpoint
         began = saved = time.monotonic()
         while run.steps < config.steps and time.monotonic() - began < config.seconds:
             run.update()
