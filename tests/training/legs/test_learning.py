@@ -118,6 +118,18 @@ def test_rows_of_the_curve_that_are_learned_again_are_left_out(tmp_path: Path) -
     assert read_curve(tmp_path)["steps"].tolist() == pytest.approx([192 * k for k in range(1, 11)], rel=1e-4)
 
 
+def test_a_network_of_other_layers_is_exported_read_and_trained_on_by_its_like_alone(tmp_path: Path) -> None:
+    checkpoint = train(small(tmp_path / "run", updates=1, ppo=PpoConfig(hidden=(16, 8))))
+    network, _ = export(checkpoint, tmp_path)
+    seen = torch.randn(2, load_actor(checkpoint).net[0].in_features)
+    with torch.no_grad():
+        torch.testing.assert_close(load_actor(network)(seen), load_actor(checkpoint)(seen))
+    for start in (checkpoint, network):
+        with pytest.raises(ConfigError, match=r"has other layers than this run; give it those with --ppo\.hidden"):
+            train(small(tmp_path / start.suffix, updates=2700, start=start))
+    train(small(tmp_path / "on", updates=2, start=checkpoint, ppo=PpoConfig(hidden=(16, 8))))
+
+
 def test_a_run_that_begins_with_anothers_networks_draws_its_own_noise(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -25,7 +25,7 @@ from golem.errors import ConfigError
 from golem.training.legs.checkpoint import read_checkpoint
 from golem.training.legs.env import LAYOUT, PERIOD, SEEN, TASKS, EnvConfig, Task
 from golem.training.legs.mirror import Mirror, leg_mirror
-from golem.training.legs.ppo import Actor, PpoConfig
+from golem.training.legs.ppo import Actor
 from golem.training.legs.training_model import KD, KP, STANCE
 
 OPSET = 17
@@ -44,15 +44,16 @@ def load_actor(path: Path) -> Actor:
 
 
 def _trained_actor(saved: dict[str, Any]) -> Actor:
-    actor = _untrained_actor()
+    actor = _untrained_actor(tuple(saved["config"]["ppo"]["hidden"]))
     actor.load_state_dict(saved["legs"]["actor"])
     return actor
 
 
 def _exported_actor(path: Path) -> Actor:
-    actor = _untrained_actor()
     try:
         weights = {w.name: numpy_helper.to_array(w) for w in onnx.load(str(path)).graph.initializer}
+        layers = sum(name.startswith("bias") for name in weights)
+        actor = _untrained_actor(tuple(len(weights[f"bias{k}"]) for k in range(layers - 1)))
         with torch.no_grad():
             for k, layer in enumerate(_linear(actor)):
                 layer.weight.copy_(torch.from_numpy(weights[f"weight{k}"].T.copy()))
@@ -64,8 +65,8 @@ def _exported_actor(path: Path) -> Actor:
     return actor
 
 
-def _untrained_actor() -> Actor:
-    return Actor(Mirror(SEEN.components), leg_mirror(), PpoConfig().hidden).eval()
+def _untrained_actor(hidden: tuple[int, ...]) -> Actor:
+    return Actor(Mirror(SEEN.components), leg_mirror(), hidden).eval()
 
 
 def _linear(actor: Actor) -> list[nn.Linear]:
@@ -180,6 +181,8 @@ def average(networks: Sequence[Path], weights: Sequence[float], out: Path) -> No
         raise ConfigError("Networks are files that end in .onnx; 'golem train legs export' makes them of checkpoints.")
     share = torch.tensor(weights, dtype=torch.float64) / sum(weights)
     actors = [load_actor(path) for path in networks]
+    if len({tuple(layer.weight.shape for layer in _linear(actor)) for actor in actors}) > 1:
+        raise ConfigError("Networks whose layers differ have no mean.")
     mean = actors[0]
     with torch.no_grad():
         for parts in zip(*(actor.net.parameters() for actor in actors), strict=True):

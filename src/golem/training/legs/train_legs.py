@@ -232,15 +232,18 @@ class _Run:
     def begin_with(self, path: Path) -> None:
         """Take over networks and steps of another run's checkpoint, or a network that was exported.
 
-        Configuration, draws and noise are this run's own. Raises ConfigError: it has as many steps as this run is to
-        have, or this run is too short to change anything.
+        Configuration, draws and noise are this run's own. Raises ConfigError: it has other layers, as many steps as
+        this run is to have, or this run is too short to change anything.
         """
+        actor = load_actor(path).state_dict()
+        if {k: v.shape for k, v in actor.items()} != {k: v.shape for k, v in self.legs.actor.state_dict().items()}:
+            raise ConfigError(f"{path} has other layers than this run; give it those with --ppo.hidden.")
         if self._exported:
             if self.config.steps <= VALUES_FIRST:
                 raise ConfigError(
                     f"From an exported network --steps is more than {VALUES_FIRST:g}: until then only a critic learns."
                 )
-            self.legs.actor.load_state_dict(load_actor(path).state_dict())
+            self.legs.actor.load_state_dict(actor)
             self.legs.set_noise(EXPORTED_NOISE)
             return
         saved = read_checkpoint(path)
