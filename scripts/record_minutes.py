@@ -52,6 +52,9 @@ class Ticks:
         else:
             self.answered.add(told.reserve[0])
 
+    def close(self) -> None:
+        """Nothing is open."""
+
     def __str__(self) -> str:
         first, last = min(self.states), max(self.states)
         wanted = set(range(first, last + 1, PERIOD))

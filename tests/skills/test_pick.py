@@ -22,6 +22,7 @@ from golem.interfaces.payloads import DetectionRequest
 from golem.robots.model.magpie_model import MAX_GAP
 from golem.skills.base import SkillResult, StageFailed
 from golem.skills.pick import Pick, PickConfig, PickGoal, followed
+from golem.skills.pick_config import Hand
 from golem.skills.pick_targets import called
 from golem.skills.runner import SkillRun
 from golem.skills.travel import LineTravel
@@ -63,7 +64,7 @@ def refusing(refusal: Refusal) -> Any:
 
 
 def picked(
-    world: Any, method: GraspMethod | None = None, side: Side = "right", config: PickConfig = CONFIG, **goal: Any
+    world: Any, method: GraspMethod | None = None, side: Hand = "right", config: PickConfig = CONFIG, **goal: Any
 ) -> SkillResult:
     """Run a pick to its end."""
     world.method = method or VisualServo()
