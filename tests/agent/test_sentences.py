@@ -180,7 +180,16 @@ def test_each_call_is_compared_with_the_answer_of_its_own_start(tmp_path: Path) 
     assert [(a, b) for _, a, b in replay(tmp_path / "audit.jsonl", now.desk.call)] == [(True, True), (False, True)]
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.fixture(params=[signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def number(request: pytest.FixtureRequest) -> Iterator[signal.Signals]:
+    """A signal that ends a process, also where the tests run behind `nohup` or `&`, which ignore some."""
+    before = signal.signal(
+        request.param, signal.default_int_handler if request.param == signal.SIGINT else signal.SIG_DFL
+    )
+    yield request.param
+    signal.signal(request.param, before)
+
+
 def test_a_robot_on_a_domain_does_not_go_on_when_the_command_is_ended(
     number: signal.Signals, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
