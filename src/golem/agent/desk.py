@@ -269,8 +269,9 @@ class Desk:
         result = self.body.result()
         if result is None:
             moment = self.body.moment()
-            excess = "" if moment is None else self._excess(moment)
-            excess = "" if self._over else self._audit.problem or excess
+            excess = ""
+            if not self._over:
+                excess = self._audit.problem or ("" if moment is None else self._excess(moment))
             if excess:
                 self._over = excess
                 self._tell("excess", call, why=excess)

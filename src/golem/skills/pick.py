@@ -139,7 +139,6 @@ class Pick:
         except StageFailed as failure:
             if not self._looks_again or context.t - timings["start"] > self._config.look_again:
                 raise
-            self._note(failure)
             context.say(failure.stage, f"{failure} Looking once more.")
             for side in _hands(goal, tried):
                 context.hands[side].open(self._config.release_gap)

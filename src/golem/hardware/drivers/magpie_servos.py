@@ -35,6 +35,7 @@ from golem.hardware.drivers.dynamixel import (
     sync_write_packet,
 )
 from golem.hardware.drivers.serial_port import PortError, SerialPort
+from golem.options import require
 from golem.robots.model import magpie_model
 from golem.robots.model.magpie_model import MAX_FORCE
 from golem.types import HandCommand, HandState
@@ -194,15 +195,11 @@ class MagpieServoConfig:
     def __post_init__(self) -> None:
         if self.a.id == self.b.id:
             raise ConfigError(f"The two servos of a hand have the id {self.a.id}; each needs its own.")
-        for name, value, least, most in (
-            ("id", self.a.id, 0, LAST_ID),
-            ("id", self.b.id, 0, LAST_ID),
-            ("speed", self.speed, 1, TICKS),
-            ("margin", self.margin, 0, 255),
-            ("slope", self.slope, 2, 128),
-        ):
-            if not least <= value <= most:
-                raise ConfigError(f"The {name} of a hand's servo is {least} to {most}, not {value}.")
+        a, b = self.a.id, self.b.id
+        bounds = [("id", a, 0, LAST_ID), ("id", b, 0, LAST_ID), ("speed", self.speed, 1, TICKS)]
+        bounds += [("margin", self.margin, 0, 255), ("slope", self.slope, 2, 128)]
+        for name, x, least, most in bounds:
+            require("", (f"{name} of a hand's servo", x, least <= x <= most, f"{least} to {most}"))
         if {abs(self.a.closes), abs(self.b.closes)} != {1}:
             raise ConfigError("A finger closes by turning counter-clockwise, 1, or clockwise, -1.")
 
