@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from golem.capabilities.perception.open_box import OpenBox
+from golem.skills.container import Container
 from golem.skills.hand_offset import shift_of
-from golem.skills.pick_targets import Container
 from golem.types import Array, Detection, LocalizedObject
 
 ROW = np.array([[0.43, y, -0.03] for y in (-0.2, -0.1, 0.0)])
@@ -71,6 +71,18 @@ def test_a_wall_that_seems_to_have_moved_is_nothing_new(tray: Container, off: tu
 def test_what_is_not_in_view_is_not_known(tray: Container) -> None:
     assert tray.gained(view(1, share=0.4)) is None
     assert Container(tray.sighting, None, 0.15).gained(view(1)) is None
+
+
+def test_what_a_wall_hides_where_the_hand_let_go_is_not_known(tray: Container) -> None:
+    points = view(1)
+    near = (points[:, :2] - BOX.center) @ AXES
+    hidden = points[near[:, 0] > -0.03]
+    corner = (BOX.center + AXES @ (-0.06, 0.0)).tolist()
+    middle = BOX.center.tolist()
+    assert tray.gained(hidden, middle) is False
+    assert tray.gained(hidden, corner) is None
+    assert tray.gained(points, middle) is False, "all of it is in view"
+    assert tray.gained(view(1, screw=True), corner) is True
 
 
 def test_the_first_place_is_the_middle_as_the_localizer_tells_it(tray: Container) -> None:

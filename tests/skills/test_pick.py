@@ -253,7 +253,7 @@ def test_a_hand_lets_go_where_the_palm_camera_shows_the_shape_of_the_tray(
         near = min(np.linalg.norm(at - TRAY[:2] - off) for at in around)
         return replace(wanted, center=TRAY[:2] + off) if near < 0.07 else None
 
-    monkeypatch.setattr("golem.skills.pick_targets.fit_open_box", lambda _: box)
+    monkeypatch.setattr("golem.skills.container.fit_open_box", lambda _: box)
     monkeypatch.setattr("golem.skills.pick_place.find_box", find)
     full.objects["right_hand"] = lambda: [
         thing("screw", SCREW, full.t), thing("tray", TRAY + (*seen, 0.0), full.t, 0.15)
@@ -267,8 +267,11 @@ def test_a_hand_lets_go_where_the_palm_camera_shows_the_shape_of_the_tray(
             let_go.append(full.context.arms["right"].commanded[:3, 3].copy())
 
     full.step = step
-    assert picked(full).success
+    result = picked(full)
+    assert result.success
     np.testing.assert_allclose(let_go[0][:2], TRAY[:2] + goes, atol=0.002)
+    there = [] if seen[0] == 0.2 else TRAY[:2] + goes - np.array(off)  # the palm camera did not see what is below it
+    np.testing.assert_allclose(result.value.let_go, there, atol=0.002)
 
 
 @pytest.mark.parametrize("turned", [0.0, 0.5 * np.pi, -2.0])

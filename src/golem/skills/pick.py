@@ -181,7 +181,8 @@ class Pick:
                 grasp = await self._approach(context, attempt)
                 await self._learn(context, attempt)
                 await self._take(context, attempt, grasp, timings)
-                await place(context, self._config, self._travel, attempt, self._held_at, choice, self._off)
+                args = self._config, self._travel, attempt, self._held_at, choice, self._off
+                self._report.let_go = await place(context, *args)
                 return attempt
             except StageFailed as failure:
                 self._note(failure)

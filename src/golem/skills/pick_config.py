@@ -82,6 +82,7 @@ class PickReport:
         in_tray: whether the head camera saw it in the container afterwards, one of `Sight`.
         bore_empty: whether it saw that the object's place is empty, one of `Sight`.
         off: by how much, along x and y, the hand's own camera was known to see things elsewhere [m]; () where unknown.
+        let_go: x and y in odom, as the head camera shows it, where a hand let go that saw the container below it [m].
     """
 
     outcome: str = PickOutcome.FAILED.value
@@ -89,6 +90,7 @@ class PickReport:
     in_tray: str = Sight.UNKNOWN.value
     bore_empty: str = Sight.UNKNOWN.value
     off: tuple[float, ...] = ()
+    let_go: tuple[float, ...] = ()
 
     @property
     def seen(self) -> str:

@@ -12,15 +12,16 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from golem.capabilities.perception.box_search import find_box
-from golem.capabilities.perception.open_box import OpenBox
+from golem.capabilities.perception.open_box import EDGE_ROOM, OpenBox
 from golem.capabilities.planning.base import Refusal
 from golem.interfaces.payloads import GripState
 from golem.skills.base import StageFailed
+from golem.skills.container import Container
 from golem.skills.context import Context
 from golem.skills.force_guard import ForceGuard
 from golem.skills.hand_offset import shift_of
 from golem.skills.pick_config import PickConfig, PickFailed, PickOutcome, PickReport, Sight, refusal_of, slipped
-from golem.skills.pick_targets import Attempt, Container, HandReach, PickChoice, positions
+from golem.skills.pick_targets import Attempt, HandReach, PickChoice, positions
 from golem.skills.poses import lifted, moved, turned
 from golem.skills.travel import Travel
 from golem.skills.ware_sight import beyond_fingers
@@ -88,8 +89,11 @@ async def pull(
 
 async def place(
     context: Context, config: PickConfig, travel: Travel, attempt: Attempt, seen: Array, choice: PickChoice, off: Array
-) -> None:
+) -> tuple[float, ...]:
     """Carry what a hand holds over the container and let go.
+
+    Returns: where, x and y in odom as the head camera shows it [m]; () where the palm camera did not see the container
+    below.
 
     Args:
         seen: (3,) where the palm camera saw what the head camera had chosen, in odom [m].
@@ -116,11 +120,15 @@ async def place(
         if refusal_of(failure) is Refusal.UNREACHABLE:
             raise PickFailed(PickOutcome.TRAY_OUT_OF_REACH, failure.stage, failure.slot, str(failure)) from failure
         raise
-    await _nearer(context, config, travel, attempt, container, shift)
+    below = await _nearer(context, config, travel, attempt, container, shift)
     if not hand.status.holding:
         raise PickFailed(PickOutcome.SLIPPED, "place", "grasp_method", f"The {attempt.label} was lost on the way.")
+    at = arm.commanded[None, :3, 3]
     hand.open(config.release_gap)
     await context.until(lambda: hand.status.state is GripState.OPEN, 2.0)
+    if container.box is None or below is None or not below.contains(at, EDGE_ROOM).all():
+        return ()
+    return tuple((at[0, :2] - below.center + container.box.center).tolist())
 
 
 def _leaning(out: Array, lean: float) -> Array:
@@ -152,27 +160,28 @@ async def set_back(context: Context, config: PickConfig, travel: Travel, side: S
 
 async def _nearer(
     context: Context, config: PickConfig, travel: Travel, attempt: Attempt, container: Container, shift: Array
-) -> None:
+) -> OpenBox | None:
     """Look down at the container with the palm camera, and go further inside if the hand is near its rim or beside it.
 
-    Where too little of the container is in view, it looks from higher up.
+    Where too little of the container is in view, it looks from higher up. Returns the container as that camera sees it.
 
     Args:
         shift: (3,) from where the head camera sees things to where the palm camera does, in odom [m].
     """
     if container.box is None:
-        return
+        return None
     box = replace(container.box, center=container.box.center + shift[:2], rim=container.box.rim + shift[2])
     arm, raised = context.arms[attempt.side], False
     hand = arm.commanded
-    away = await _to_middle(context, config, attempt, box)
-    if away is None:
+    found = await _below(context, config, attempt, box)
+    if found is None:
         with suppress(StageFailed):
             await travel.carry(attempt.side, [lifted(hand, HIGHER)], config.travel_speed)
             raised = True
-            away = await _to_middle(context, config, attempt, box)
+            found = await _below(context, config, attempt, box)
     goals = list[Array]()
-    if away is not None and np.linalg.norm(away) > INSIDE:
+    away = np.zeros(3) if found is None else np.append(found.center - arm.pose[:2, 3], 0.0)
+    if np.linalg.norm(away) > INSIDE:
         inside = [moved(hand, share * away) for share in SHARES]
         goals = [turned(T, turn) for T in inside for turn in config.turns]
     if raised:
@@ -180,10 +189,11 @@ async def _nearer(
     if goals:
         with suppress(StageFailed):  # then it is no nearer than it is
             await travel.carry(attempt.side, goals, config.travel_speed)
+    return found
 
 
-async def _to_middle(context: Context, config: PickConfig, attempt: Attempt, box: OpenBox) -> Array | None:
-    """Return (3,) the level way from the hand to the middle of `box` where the palm camera shows it, in odom [m].
+async def _below(context: Context, config: PickConfig, attempt: Attempt, box: OpenBox) -> OpenBox | None:
+    """Return `box` where the palm camera shows it, in odom.
 
     It is looked for around each thing that the camera takes for the container, mostly one half of it, and around their
     mean; where it takes nothing for it, around where it should be.
@@ -195,8 +205,7 @@ async def _to_middle(context: Context, config: PickConfig, attempt: Attempt, box
         return None
     there = [o.position[:2] for o in sightings.objects if o.label == attempt.container]
     there = [at for at in there if np.linalg.norm(at - box.center) < FARTHEST] or [box.center]
-    found = find_box(box, beyond_fingers(context, side), [*there, np.mean(there, axis=0)])
-    return None if found is None else np.append(found.center - context.arms[side].pose[:2, 3], 0.0)
+    return find_box(box, beyond_fingers(context, side), [*there, np.mean(there, axis=0)])
 
 
 async def look_after(
@@ -205,7 +214,8 @@ async def look_after(
     """Look with the head camera at container and bore for `names`, and write into the report what it saw.
 
     The object is in the container if something rises there now, or more such objects are seen there than before. Its
-    place is empty if one of those that were seen around it before is seen no more.
+    place is empty if one of those that were seen around it before is seen no more. Where the hand let go above the
+    container and a wall hides what lies there, the camera says nothing of that.
     """
     frames: list[Array] = []
     clouds: list[Array] = []
@@ -222,7 +232,7 @@ async def look_after(
     inside = choice.container.holds(choice.seen)
     if clouds:
         more = [int(choice.container.holds(points).sum()) > int(inside.sum()) for points in frames]
-        gained = choice.container.gained(np.concatenate(clouds))
+        gained = choice.container.gained(np.concatenate(clouds), report.let_go)
         if gained is not None or any(more):
             report.in_tray = (Sight.YES if gained or 2 * sum(more) > len(more) else Sight.NO).value
     taken = report.tried[-1]

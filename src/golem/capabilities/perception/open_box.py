@@ -72,15 +72,25 @@ class OpenBox:
             points: (n, 3) of one or more views in odom [m]; cells with fewer than `LEAST` of them are NaN.
             beyond: cells by which the grid is larger, on each side.
         """
-        halves = np.maximum(0.5 * self.size - EDGE_ROOM, GRID) + beyond * GRID
+        halves, shape = self._grid(beyond)
         turned = (points[:, :2] - self.center) @ self.axes
-        shape = np.ceil(2.0 * halves / GRID).astype(int)
         index = np.floor((turned + halves) / GRID).astype(int)
         inside = np.all((index >= 0) & (index < shape), axis=1)
         flat = np.ravel_multi_index(tuple(index[inside].T), tuple(shape))
         count = np.bincount(flat, minlength=int(shape.prod()))
         total = np.bincount(flat, weights=points[inside, 2], minlength=int(shape.prod()))
         return np.where(count >= LEAST, total / np.maximum(count, 1), np.nan).reshape(shape)
+
+    def cells(self, beyond: int = 0) -> Array:
+        """Return (nx, ny, 2) the middles of the cells of `heights`, in odom [m]."""
+        halves, shape = self._grid(beyond)
+        grid = np.stack(np.meshgrid(*(np.arange(n) + 0.5 for n in shape), indexing="ij"), axis=-1) * GRID - halves
+        return self.center + grid @ self.axes.T
+
+    def _grid(self, beyond: int) -> tuple[Array, NDArray[np.intp]]:
+        """Return (2,) half of the sides of the grid of `heights` [m], and (2,) how many cells it has along each."""
+        halves = np.maximum(0.5 * self.size - EDGE_ROOM, GRID) + beyond * GRID
+        return halves, np.ceil(2.0 * halves / GRID).astype(int)
 
     def places(self, margin: float, spacing: float = 0.02) -> Array:
         """Return (n, 3) places at the height of `level`, `margin` [m] inside the rim and `spacing` [m] apart.
