@@ -15,7 +15,7 @@ from golem.capabilities.policies.vectors import STATE
 from golem.datasets import commands, swap
 from golem.datasets import episode_writer as writing
 from golem.datasets.commands import findings as check
-from golem.datasets.episode_writer import DatasetWriter
+from golem.datasets.episode_writer import LONGEST, DatasetWriter
 from golem.datasets.schema import DatasetError, Recipe
 from golem.datasets.store import DatasetFolder
 from golem.errors import ConfigError, GolemError, OutputError
@@ -65,6 +65,17 @@ def test_a_sound_data_set_has_no_findings(dataset: Path, capsys: pytest.CaptureF
 def test_a_data_set_goes_on(dataset: Path) -> None:
     write(dataset, (7,))
     assert [e.length for e in DatasetFolder(dataset).episodes] == [20, 70, 5, 7] and told(dataset) == []
+
+
+def test_a_long_episode_goes_on_as_the_next_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(writing, "LONGEST", 2.0)  # 30 frames
+    data = DatasetFolder(write(tmp_path / "set", (60, 31)))
+    assert [e.length for e in data.episodes] == [30, 30, 30, 1] and told(data.root) == []
+
+
+def test_times_of_the_longest_episode_are_within_the_tolerance() -> None:
+    at = np.arange(round(LONGEST * 30)) / 30
+    assert np.abs(at.astype(np.float32) - at).max() < commands.TIME
 
 
 def test_one_that_was_recorded_otherwise_does_not(dataset: Path) -> None:

@@ -28,6 +28,9 @@ LEVEL = "lp=1"
 bits and 1.4 times the CPU [own]."""
 BATCH = 64
 """Frames whose depth and masks are held in memory [own: 40 MB of VGA depth]."""
+LONGEST = 1800.0
+"""Time after which an episode goes on as the next one [s]: beyond 2048 s times in float32, as the format has them, are
+farther off than LeRobot's tolerance."""
 LOOK = 8
 """Of each picture every so many pixels go into its statistics, along both axes."""
 
@@ -142,7 +145,7 @@ class DatasetWriter:
         self._kept: dict[str, list[Any]] = {name: [] for name in self._rows if len(self._features[name].shape) == 1}
 
     def add(self, frame: Mapping[str, Any]) -> None:
-        """Append a frame: a value for each feature.
+        """Append a frame: a value for each feature. After `LONGEST` it is the first of a new episode.
 
         Raises:
             DatasetError: a value is missing, has another shape, or is not finite; the frame is not recorded.
@@ -154,6 +157,9 @@ class DatasetWriter:
             if value.shape != feature.shape or not (feature.is_video or np.isfinite(value).all()):
                 raise DatasetError(f"The {name} of a frame is finite and of shape {feature.shape}, not {value.shape}.")
             values[name] = value.astype(np.uint8 if feature.is_video else feature.dtype)
+        if self.length >= LONGEST * self._fps:
+            self.finish()
+            self.begin(self._task)
         with self._writable():
             for name, video in self._videos.items():
                 video.add(values[name])
