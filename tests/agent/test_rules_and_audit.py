@@ -103,3 +103,14 @@ def test_the_log_goes_on_and_what_is_none_is_refused(tmp_path: Path) -> None:
         file.write_text(f"{lines[0]}\n{wrong}\n")
         with pytest.raises(GolemError, match="after"):
             read_audit(file)
+
+
+def test_half_a_line_that_a_lost_power_left_spoils_no_log(tmp_path: Path) -> None:
+    file = tmp_path / "audit.jsonl"
+    whole = '{"event": "begin", "utc": 1.0, "t": 0.0}\n'
+    for before in ("", whole):
+        file.write_text(before + '{"event": "call", "too')
+        AuditLog(file, bag="bag").close()
+        entries = read_audit(file)
+        assert entries[-1]["event"] == "begin" and entries[-1]["torn"] == '{"event": "call", "too'
+        assert len(entries) == 1 + bool(before)

@@ -180,6 +180,16 @@ def test_each_call_is_compared_with_the_answer_of_its_own_start(tmp_path: Path) 
     assert [(a, b) for _, a, b in replay(tmp_path / "audit.jsonl", now.desk.call)] == [(True, True), (False, True)]
 
 
+@pytest.mark.parametrize("change", [("session", "sitting"), ('"answer": {', '"answer": 3, "more": {')])
+def test_a_log_that_was_changed_is_refused_before_anything_is_called(tmp_path: Path, change: tuple[str, str]) -> None:
+    then, now = (Rig(tmp_path / name, Rules(default="free")) for name in ("then", "now"))
+    then.desk.call("go", {"x": 1.0})
+    then.file.write_text(then.file.read_text().replace(*change))
+    with pytest.raises(ConfigError, match="was changed"):
+        list(replay(then.file, now.desk.call))
+    assert not now.body.began
+
+
 @pytest.fixture(params=[signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def number(request: pytest.FixtureRequest) -> Iterator[signal.Signals]:
     """A signal that ends a process, also where the tests run behind `nohup` or `&`, which ignore some."""

@@ -18,7 +18,7 @@ from golem.capabilities.perception.open_box import OpenBox
 from golem.capabilities.planning.base import PlanRefused, Refusal
 from golem.errors import ConfigError
 from golem.interfaces import topics
-from golem.interfaces.payloads import DetectionRequest
+from golem.interfaces.payloads import DetectionRequest, GripState
 from golem.robots.model.magpie_model import MAX_GAP
 from golem.skills.base import SkillResult, StageFailed
 from golem.skills.pick import Pick, PickConfig, PickGoal, followed
@@ -550,6 +550,18 @@ def test_a_screw_lost_on_the_way(full: Any) -> None:
     full.loses = lambda: full.stages[-1:] == ["place"]
     failed(picked(full), "place", "grasp_method", "lost on the way", "slipped")
     assert_safe(full)
+
+
+def test_a_hand_that_does_not_open_is_named_and_nothing_is_called_dropped(full: Any) -> None:
+    tick = full.step
+
+    def step() -> None:
+        tick()
+        if full.stages[-1:] == ["place"] and full._state["right"] is GripState.OPENING:
+            full._moving["right"] = 2
+
+    full.step = step
+    failed(picked(full), "place", "hand", "The right hand does not open (gap 10 mm)", "failed")
 
 
 @pytest.mark.parametrize("called", ["screw", "nut"])

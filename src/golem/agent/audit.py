@@ -17,7 +17,7 @@ LONGEST = 4000
 
 
 class AuditLog:
-    """Writes one file; `problem` says why the newest entry is not in it, empty where it is."""
+    """Writes one file, of whole lines; `problem` says why the newest entry is not in it, empty where it is."""
 
     def __init__(self, file: Path, **first: object) -> None:
         """Go on with `file`; `first` says what it belongs to, e.g. a bag. Raises OutputError: it cannot be written."""
@@ -25,6 +25,10 @@ class AuditLog:
         try:
             file.parent.mkdir(parents=True, exist_ok=True)
             self._out = os.open(file, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600)
+            whole, _, torn = file.read_bytes().rpartition(b"\n")
+            if torn:  # the machine lost its power in the middle of a line
+                os.ftruncate(self._out, len(whole) + (1 if whole else 0))
+                first |= {"torn": torn.decode("utf-8", "replace")}
         except OSError as error:
             raise OutputError(f"Cannot write {file}: {error.strerror}.") from error
         self.write("begin", 0.0, **first)

@@ -183,13 +183,18 @@ def replay(file: Path, use: Use) -> Iterator[tuple[str, bool, bool]]:
         if entry["event"] == "begin" or not starts:
             starts.append([])
         starts[-1].append(entry)
-    for entries in starts:
-        yield from _replay(entries, use)
+    try:
+        calls = [call for entries in starts for call in _calls(entries)]
+    except (KeyError, TypeError, AttributeError) as error:
+        raise ConfigError(f"The audit log '{file}' was changed: an entry of it lacks {error}.") from error
+    for tool, arguments, then in calls:
+        yield tool, then, use(tool, arguments)["success"] is True
 
 
-def _replay(entries: list[dict[str, Any]], use: Use) -> Iterator[tuple[str, bool, bool]]:
+def _calls(entries: list[dict[str, Any]]) -> Iterator[tuple[str, dict[str, Any], bool]]:
+    """Yield tool and arguments of each call that was kept whole, and whether it succeeded."""
     ends = {(e["session"], e["number"]): e for e in entries if e["event"] in ("answer", "refuse")}
     for entry in entries:
         if entry["event"] == "call" and isinstance(entry["arguments"], dict):
-            then = ends.get((entry["session"], entry["number"]), {}).get("answer", {}).get("success") is True
-            yield entry["tool"], then, use(entry["tool"], entry["arguments"])["success"] is True
+            answer = ends.get((entry["session"], entry["number"]), {}).get("answer", {})
+            yield entry["tool"], entry["arguments"], answer.get("success") is True

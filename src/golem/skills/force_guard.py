@@ -1,4 +1,4 @@
-"""Closes a hand and feels what it meets: what is screwed down is let go, and nothing is pressed on."""
+"""Closes and opens a hand, and feels what it meets: what is screwed down is let go, and nothing is pressed on."""
 
 from __future__ import annotations
 
@@ -19,6 +19,8 @@ HEARD = 0.06
 """Time in which a hand begins what it was told [s]."""
 PATIENCE = 2.5
 """Time the fingers may take [s]."""
+OPENS = 0.005
+"""Fingers that open go apart by so much, at the least [m]."""
 
 
 class KeptGrip:
@@ -57,6 +59,15 @@ async def close_hand(context: Context, side: Side, force: float, patience: float
     await context.sleep(HEARD)
     await context.until(lambda: hand.status.state in CLOSED, patience)
     return hand.status.holding
+
+
+async def open_hand(context: Context, side: Side, gap: float, stage: str) -> None:
+    """Let go of what a hand holds, its fingers `gap` [m] apart. Raises StageFailed, of `stage`: they do not open."""
+    hand, before = context.hands[side], context.hands[side].status.gap
+    hand.open(gap)
+    opened = await context.until(lambda: hand.status.state is GripState.OPEN, PATIENCE)
+    if not opened and hand.status.gap < min(before + OPENS, gap - OPENS):
+        raise StageFailed(stage, "hand", f"The {side} hand does not open (gap {1e3 * hand.status.gap:.0f} mm).")
 
 
 TICKS = 5

@@ -13,11 +13,10 @@ from golem.capabilities.grasping.door_arc import Door, DoorArc, door_behind
 from golem.capabilities.grasping.object_cloud import spaced
 from golem.capabilities.planning.base import PlanRefused
 from golem.errors import ConfigError
-from golem.interfaces.payloads import GripState
 from golem.options import require
 from golem.skills.base import SkillCancelled, SkillResult, StageFailed
 from golem.skills.context import Context
-from golem.skills.force_guard import CLOSED
+from golem.skills.force_guard import CLOSED, open_hand
 from golem.skills.palm_look import NEAR
 from golem.skills.planned_motion import PlannedMotion, Then
 from golem.skills.poses import moved, retracted
@@ -366,9 +365,8 @@ class OpenDoor:
 
     async def _release(self, context: Context, side: Side) -> None:
         """Let go, and back off; the hand stays there: on its way home the arm might push the door shut."""
-        arm, hand = context.arms[side], context.hands[side]
+        arm = context.arms[side]
         context.say("release", "Letting go.")
-        hand.open(self._config.release_gap)
-        await context.until(lambda: hand.status.state is GripState.OPEN, 2.0)
+        await open_hand(context, side, self._config.release_gap, "release")
         if arm.sent:
             await arm.move(retracted(arm.commanded, self._config.back), self._config.travel_speed)

@@ -14,11 +14,10 @@ from scipy.spatial.transform import Rotation
 from golem.capabilities.perception.box_search import find_box
 from golem.capabilities.perception.open_box import EDGE_ROOM, OpenBox
 from golem.capabilities.planning.base import Refusal
-from golem.interfaces.payloads import GripState
 from golem.skills.base import StageFailed
 from golem.skills.container import Container
 from golem.skills.context import Context
-from golem.skills.force_guard import ForceGuard
+from golem.skills.force_guard import ForceGuard, open_hand
 from golem.skills.hand_offset import shift_of
 from golem.skills.pick_config import PickConfig, PickFailed, PickOutcome, PickReport, Sight, refusal_of, slipped
 from golem.skills.pick_targets import Attempt, HandReach, PickChoice, positions
@@ -124,8 +123,7 @@ async def place(
     if not hand.status.holding:
         raise PickFailed(PickOutcome.SLIPPED, "place", "grasp_method", f"The {attempt.label} was lost on the way.")
     at = arm.commanded[None, :3, 3]
-    hand.open(config.release_gap)
-    await context.until(lambda: hand.status.state is GripState.OPEN, 2.0)
+    await open_hand(context, attempt.side, config.release_gap, "place")
     if container.box is None or below is None or not below.contains(at, EDGE_ROOM).all():
         return ()
     return tuple((at[0, :2] - below.center + container.box.center).tolist())
@@ -145,7 +143,7 @@ async def set_back(context: Context, config: PickConfig, travel: Travel, side: S
         gap: between the fingers as they came, which there is room for [m].
     """
     context.say("place", "Setting it back where it was taken.")
-    arm, hand = context.arms[side], context.hands[side]
+    arm = context.arms[side]
     with suppress(StageFailed):
         await travel.carry(side, [lifted(T, config.clearance)], config.travel_speed)
         stop = await ForceGuard.at_rest(context, side, T[:3, 2], config.press_force, lead=LEAD)
@@ -153,8 +151,7 @@ async def set_back(context: Context, config: PickConfig, travel: Travel, side: S
             await travel.line(side, T, config.descend_speed, "place", stop=stop)
         except StageFailed:  # askew is better than to let it fall on the pack
             await arm.move(T, config.descend_speed, stop=stop)
-        hand.open(gap)
-        await context.until(lambda: hand.status.state is GripState.OPEN, 2.0)
+        await open_hand(context, side, gap, "place")
         await arm.move(lifted(arm.commanded, config.clearance), config.travel_speed)
 
 

@@ -15,12 +15,11 @@ from golem.capabilities.grasping.object_cloud import MIN_POINTS
 from golem.capabilities.planning.base import Held, PlanRefused
 from golem.capabilities.planning.rules import HandUpright, Rule
 from golem.errors import ConfigError
-from golem.interfaces.payloads import GripState
 from golem.options import require
 from golem.robots.model.magpie_model import MAX_GAP
 from golem.skills.base import SkillCancelled, SkillResult, StageFailed
 from golem.skills.context import Context
-from golem.skills.force_guard import ForceGuard, close_hand
+from golem.skills.force_guard import ForceGuard, close_hand, open_hand
 from golem.skills.planned_motion import PlannedMotion, Then
 from golem.skills.poses import at_height, head_off, lifted, retracted
 from golem.skills.travel import APPROACH, OVER, blaming
@@ -348,10 +347,9 @@ class SetDown:
         self._report.x, self._report.y, self._report.z = (float(v) for v in arm.pose[:3, 3])
 
     async def _release(self, context: Context, motion: PlannedMotion, side: Side) -> None:
-        c, arm, hand = self._config, context.arms[side], context.hands[side]
+        c, arm = self._config, context.arms[side]
         context.say("release", "Letting go.", side=side)
-        hand.open(min(hand.status.gap + 0.03, MAX_GAP))
-        await context.until(lambda: hand.status.state is GripState.OPEN, 2.0)
+        await open_hand(context, side, min(context.hands[side].status.gap + 0.03, MAX_GAP), "release")
         T = retracted(arm.commanded, c.back)
         await arm.move(T, 0.5 * c.travel_speed)
         if T[2, 2] > -0.9:
