@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from golem.capabilities.perception.open_box import OpenBox
+from golem.interfaces.payloads import Detections
 from golem.skills.container import Container
 from golem.skills.hand_offset import shift_of
+from golem.skills.pick_config import PickConfig, PickReport, Sight
+from golem.skills.pick_place import look_after
+from golem.skills.pick_targets import Attempt, PickChoice
 from golem.types import Array, Detection, LocalizedObject
 
 ROW = np.array([[0.43, y, -0.03] for y in (-0.2, -0.1, 0.0)])
@@ -83,6 +90,43 @@ def test_what_a_wall_hides_where_the_hand_let_go_is_not_known(tray: Container) -
     assert tray.gained(hidden, corner) is None
     assert tray.gained(points, middle) is False, "all of it is in view"
     assert tray.gained(view(1, screw=True), corner) is True
+
+
+KNOWN, NEW, ELSEWHERE = (0.48, -0.31, 0.02), (0.51, -0.3, 0.02), (0.53, -0.22, 0.02)
+
+
+@pytest.mark.parametrize(
+    ("frames", "told"),
+    [
+        ([[KNOWN], [KNOWN, NEW], [], [NEW], [KNOWN]], Sight.YES),  # half of what lies there is in a frame
+        ([[KNOWN], [KNOWN, NEW], [], [], [KNOWN]], Sight.UNKNOWN),
+        ([[KNOWN]] * 5, Sight.UNKNOWN),  # it may lie beside it
+        ([[], [ELSEWHERE], [], [], []], Sight.NO),
+    ],
+)
+def test_what_lies_where_the_hand_let_go_is_what_it_held(
+    tray: Container, frames: list[list[tuple[float, ...]]], told: Sight
+) -> None:
+    things = [
+        [
+            LocalizedObject(Detection("nut", 0.9, np.zeros(4), np.zeros(2)), 0.0, np.array(p), np.zeros((0, 3)))
+            for p in f
+        ]
+        for f in frames
+    ]
+    shown = iter([Detections(0.0, "head", (*f, replace(tray.sighting, points=view(k)))) for k, f in enumerate(things)])
+
+    async def look(timeout: float) -> Detections | None:
+        return next(shown, None)
+
+    eye = SimpleNamespace(look=look)
+    context: Any = SimpleNamespace(t=0.0, watch=lambda *_, **__: nullcontext(eye))
+    attempt = Attempt("nut", "tray", "right", tray.sighting)
+    report = PickReport(tried=[attempt.first_seen], let_go=(0.5, -0.3))
+    choice = PickChoice([attempt], tray, np.array([KNOWN]))
+    with pytest.raises(StopIteration):
+        look_after(context, PickConfig(looks_after=5), attempt, choice, ("nut",), report).send(None)
+    assert report.in_tray == told.value
 
 
 def test_the_first_place_is_the_middle_as_the_localizer_tells_it(tray: Container) -> None:

@@ -20,7 +20,7 @@ RISE = 0.004
 """What is higher than before by this is new [m]: a screw lies 10 mm high, and the noise of a cell is 1 mm."""
 SPOTS = 3
 """Cells that have to be higher."""
-ROLLED = 0.05
+ROLLED = 0.06
 """How far from where it was let go something lies [m]."""
 INNER = int(EDGE_ROOM / GRID)
 """Cells beside those of `OpenBox.heights` that are inside the walls, too."""

@@ -15,7 +15,7 @@ from golem.capabilities.perception.box_search import find_box
 from golem.capabilities.perception.open_box import EDGE_ROOM, OpenBox
 from golem.capabilities.planning.base import Refusal
 from golem.skills.base import StageFailed
-from golem.skills.container import Container
+from golem.skills.container import ROLLED, Container
 from golem.skills.context import Context
 from golem.skills.force_guard import ForceGuard, open_hand
 from golem.skills.hand_offset import shift_of
@@ -42,6 +42,8 @@ SHARES = (1.0, 0.75, 0.5, 0.25)
 """Shares of the way to the middle that are tried."""
 SAME = 0.035
 """Two looks of the head camera at one object differ by less [m]; screws stand 9 cm apart."""
+APART, AGREE = 0.02, 2
+"""What lies in the container is new if it is this far from all that lay there [m]; in so many frames."""
 NEAR = 0.12
 """What vanished this near to where the hand took something is that: the palm camera may have seen its neighbour [m]."""
 
@@ -210,9 +212,9 @@ async def look_after(
 ) -> None:
     """Look with the head camera at container and bore for `names`, and write into the report what it saw.
 
-    The object is in the container if something rises there now, or more such objects are seen there than before. Its
-    place is empty if one of those that were seen around it before is seen no more. Where the hand let go above the
-    container and a wall hides what lies there, the camera says nothing of that.
+    The object is in the container if something rises there now, or more such objects are seen there than before, or one
+    where the hand let go. Its place is empty if one of those that were seen around it before is seen no more. Where the
+    hand let go above the container and a wall hides what lies there, the camera says nothing of that.
     """
     frames: list[Array] = []
     clouds: list[Array] = []
@@ -230,15 +232,24 @@ async def look_after(
     if clouds:
         more = [int(choice.container.holds(points).sum()) > int(inside.sum()) for points in frames]
         gained = choice.container.gained(np.concatenate(clouds), report.let_go)
-        if gained is not None or any(more):
-            report.in_tray = (Sight.YES if gained or 2 * sum(more) > len(more) else Sight.NO).value
+        seen, absent = gained or 2 * sum(more) > len(more), gained is False
+        if report.let_go:  # a frame shows about half of what lies there, and a nut is too flat to rise
+            near = [points[_away(points, report.let_go) < ROLLED] for points in frames]
+            new = [any(_away(choice.seen, place).min(initial=1.0) > APART for place in points) for points in near]
+            seen, absent = seen or sum(new) >= AGREE, absent and not any(map(len, near))
+        report.in_tray = (Sight.YES if seen else Sight.NO if absent else Sight.UNKNOWN).value
     taken = report.tried[-1]
     stood = choice.seen[~inside]
-    around = np.hypot(stood[:, 0] - taken.x, stood[:, 1] - taken.y) < NEAR
+    around = _away(stood, (taken.x, taken.y)) < NEAR
     if around.any():
         # In single frames a bore looks like a screw, or a screw is overlooked.
         shown = np.sum([_shown(points, stood) for points in frames], axis=0)[around]
         report.bore_empty = (Sight.YES if 2 * shown.min() < len(frames) else Sight.NO).value
+
+
+def _away(points: Array, place: Sequence[float] | Array) -> Array:
+    """Return (n,) how far `points` (n, 3) are from a place, x and y first, in the plane [m]."""
+    return np.hypot(points[:, 0] - place[0], points[:, 1] - place[1])
 
 
 def _shown(points: Array, stood: Array) -> NDArray[np.bool_]:
