@@ -66,7 +66,7 @@ class RunConfig:
     view: bool = False
     """Show a skill live in the browser, paced by the wall clock; operating always does."""
     port: int = 8080
-    """Port of the live view."""
+    """Port of the live view; whoever gives one, or an address, is shown a skill there."""
     host: str = "127.0.0.1"
     """Address that it listens on; 0.0.0.0 lets other machines in that know the token in the printed address."""
     record: Annotated[Path | None, arg(metavar="PATH", help_behavior_hint="")] = None
@@ -134,7 +134,7 @@ def run_stack(config: RunConfig, goal_words: Sequence[str] = ()) -> SkillResult:
             narrator()
             show()
 
-        if config.view:
+        if config.view or (config.port, config.host) != (RunConfig.port, RunConfig.host):
             view = closing.enter_context(LiveView(running, shown(running, robot), config.port, config.host))
             print(f"Live view: {view.url}   (Ctrl-C ends it)")
             result = view.run(name, goal, watch=watch)

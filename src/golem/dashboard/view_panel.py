@@ -93,4 +93,4 @@ class ViewPanel:
         camera = client.camera
         picture = client.get_render(int(camera.image_height), int(camera.image_width), transport_format="png")
         packed = cv2.imencode(".png", np.ascontiguousarray(picture[..., 2::-1]))[1]
-        client.send_file_download("golem.png", packed.tobytes())
+        client.send_file_download("golem.png", packed.tobytes(), save_immediately=True)

@@ -28,10 +28,11 @@ BALANCE = np.dtype(
         ("feet", FEET),
         ("tree", tree_dtype(NUM_JOINTS)),
         ("pelvis", "f8", (4,)),
-        ("most", "f8", (4,)),
+        ("most", "f8", (2, 4)),
         ("new", "i8"),
         ("com", "f8", (3,)),
         ("velocity", "f8", (3,)),
+        ("stepped", "f8"),
         ("outside", "f8"),
         ("sinks", "f8"),
         ("leans", "f8"),
@@ -40,9 +41,10 @@ BALANCE = np.dtype(
         ("airborne", "f8"),
     ]
 )
-"""Models, limits and memory; then how far the capture point is outside [m], how fast the robot sinks [m/s], by how much
-IMU and feet differ [rad], how far base_link is below `LEG` [m], for how long each has been too much, and for how long
-no foot has carried the robot [s]."""
+"""Models, limits of who stands on both feet and of who steps, and memory; then for how long both feet have carried the
+robot [s], how far the capture point is outside [m], how fast the robot sinks [m/s], by how much IMU and feet differ
+[rad], how far base_link is below `LEG` [m], for how long each has been too much, and for how long no foot has carried
+the robot [s]."""
 _balance_at = view(BALANCE)
 LASTS = (0.03, 0.03, 0.3, 0.03)
 """Time for which each of the four may be too much [s] [own]."""
@@ -52,6 +54,8 @@ SMOOTH = 0.03
 """Time constant of the velocity of the centre of mass [s] [own]."""
 FLAT = 0.08
 """Angle between two soles below which both stand flat on one floor [rad] [own]."""
+LANDING = 0.1
+"""Time for which a foot that has come down is still landing [s] [own]."""
 AIRBORNE = 0.3
 """Time without a foot that carries, after which nobody stands [s] [own: as `SafetyLimits.base_age`]."""
 _RAYS = 24
@@ -64,7 +68,7 @@ def _blank() -> Records:
     put_feet(m["feet"], FeetConfig(), table_tree(LEGS.stop))
     m["tree"], pelvis = table_tree(NUM_JOINTS), LINKS[BASE_LINK]
     m["pelvis"] = pelvis.mass, *pelvis.com
-    m["new"], m["airborne"] = 1, math.inf
+    m["new"], m["stepped"], m["airborne"] = 1, math.inf, math.inf
     return m
 
 
@@ -76,8 +80,9 @@ def no_balance(limits: SafetyLimits | None = None) -> Records:
     return m
 
 
-def _most(limits: SafetyLimits) -> tuple[float, float, float, float]:
-    return limits.capture, limits.sinking, limits.lean, LEG - limits.low
+def _most(limits: SafetyLimits) -> Array:
+    alike = [limits.lean, LEG - limits.low]
+    return np.array([(*both, *alike) for both in zip(limits.capture, limits.sinking, strict=True)])
 
 
 def sensed(m: Records, state: LowState, dt: float | None, limits: SafetyLimits) -> Records:
@@ -182,10 +187,14 @@ def sense_balance(m: Record, q: Array, dq: Array, tau: Array, quat: Array, gyro:
     falls = m.airborne <= AIRBORNE
     if falls:
         m.outside = _outside(m, up, max(height, 0.2))
+    # A foot in the air comes down where it catches the robot, which sinks onto it.
+    one = feet.contact[0] < 0.5 or feet.contact[1] < 0.5
+    m.stepped = 0.0 if one else m.stepped + dt
+    row = 1 if m.stepped < LANDING else 0
     if feet.weight[0] > 0.7 and feet.weight[1] > 0.7:
         m.leans = _leans(feet.motion.rotations, up)
     for k, much in enumerate((m.outside, m.sinks if falls else 0.0, m.leans, m.low if falls else 0.0)):
-        m.lasted[k] = m.lasted[k] + dt if much > m.most[k] else max(0.0, m.lasted[k] - dt)
+        m.lasted[k] = m.lasted[k] + dt if much > m.most[row, k] else max(0.0, m.lasted[k] - dt)
 
 
 @njit(cache=True)
