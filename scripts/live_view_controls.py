@@ -144,7 +144,9 @@ def hanging(page: Page) -> None:
     page.check("signal", "a plot", lambda: b.choose("signal", "CoM margin [m], simulator's truth"), plots)
     b.click("joints [rad]")
     time.sleep(1.0)
-    page.check("joint slider, Move there", "the arm moves", lambda: move(page), page.says("The arms are where the panel says."))
+    page.check(
+        "joint slider, Move there", "the arm moves", lambda: move(page), page.says("The arms are where the panel says.")
+    )
     page.check("Emergency stop", "says so", lambda: b.click("Emergency stop"), page.says("estop_pressed"))
     page.check("Release, Reset and activate", "commands pass", lambda: revive(b), page.says("commands pass"))
     late = page.t

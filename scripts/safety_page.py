@@ -93,9 +93,9 @@ REASONS: dict[Reason, ReasonText] = {
     ),
     Reason.BALANCE: ReasonText(
         407,
-        f"For 30 ms, by the gate's estimate: the capture point is {_L.capture[0]:g} m outside both soles, or a robot "
-        f"on its feet sinks at {_L.sinking[0]:g} m/s ({_L.capture[1]:g} m and {_L.sinking[1]:g} m/s while a foot is in "
-        f"the air or landing). Or its base_link is under {_L.low:g} m.",
+        f"For 30 ms, by the gate's estimate: the capture point is {_L.capture[0]:g} m outside both soles, or "
+        f"{_L.capture[1]:g} m while a foot is in the air or landing. Or a robot on its feet sinks at "
+        f"{_L.sinking:g} m/s, or its base_link is under {_L.low:g} m.",
         "The legs' controller does not balance: look at its log, and at what pushed.",
     ),
     Reason.STANDING: ReasonText(

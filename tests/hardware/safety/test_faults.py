@@ -20,8 +20,8 @@ from golem.types import Array, Imu, LowCommand, LowState
 
 LIMITS = replace(
     SafetyLimits.from_profile().still(),
-    **dict.fromkeys(("drift", "imu_drift", "gravity_angle", "dead_time", "jolts", "lean"), np.inf),
-    **dict.fromkeys(("capture", "sinking", "opening"), (np.inf, np.inf)),
+    **dict.fromkeys(("drift", "imu_drift", "gravity_angle", "dead_time", "jolts", "sinking", "lean"), np.inf),
+    **dict.fromkeys(("capture", "opening"), (np.inf, np.inf)),
     least_kp=np.zeros(27),
     least_kd=np.full(27, 1e-9),
 )

@@ -36,9 +36,7 @@ STOPS: dict[str, Lift] = {
     "range": lambda limits: replace(limits, state_lower=-FAR, state_upper=FAR),
     "torque": lambda limits: replace(limits, torque_samples=10**9),
     "tilt": lambda limits: replace(limits, tilt=math.pi),
-    "balance": lambda limits: replace(
-        limits, capture=(math.inf,) * 2, sinking=(math.inf,) * 2, lean=math.inf, low=-math.inf
-    ),
+    "balance": lambda limits: replace(limits, capture=(math.inf,) * 2, sinking=math.inf, lean=math.inf, low=-math.inf),
     "sender": lambda limits: replace(
         limits,
         sane=np.full_like(limits.sane, 1e6),

@@ -139,7 +139,7 @@ class SafetyLimits:
             [own: five and a half decisions at 50 Hz].
         capture: how far the capture point may be outside what both soles span, where both carry, and where a foot is in
             the air or landing [m] [own: see decisions/control.md].
-        sinking: speed with which the centre of mass of a robot on its feet may sink, in the same two cases [m/s] [own].
+        sinking: speed with which the centre of mass of a robot on its feet may sink [m/s] [own].
         lean: angle between the IMU's up and that of two flat feet [rad] [own: a ramp of 8 degrees is 0.14].
         low: height of base_link above the lower sole below which legs that carry no longer stand [m] [own: legs take
             commanded heights from 0.75 on, and the standing controller rises from 0.67].
@@ -206,7 +206,7 @@ class SafetyLimits:
     opening: tuple[float, float] = (1.6, 1.0)
     hung: float = 0.110
     capture: tuple[float, float] = (0.18, 0.33)
-    sinking: tuple[float, float] = (0.5, 0.9)
+    sinking: float = 0.5
     lean: float = 0.25
     low: float = 0.7
     table: Array = field(init=False, repr=False, compare=False)

@@ -28,7 +28,8 @@ BALANCE = np.dtype(
         ("feet", FEET),
         ("tree", tree_dtype(NUM_JOINTS)),
         ("pelvis", "f8", (4,)),
-        ("most", "f8", (2, 4)),
+        ("most", "f8", (4,)),
+        ("step", "f8"),
         ("new", "i8"),
         ("com", "f8", (3,)),
         ("velocity", "f8", (3,)),
@@ -41,10 +42,10 @@ BALANCE = np.dtype(
         ("airborne", "f8"),
     ]
 )
-"""Models, limits of who stands on both feet and of who steps, and memory; then for how long both feet have carried the
-robot [s], how far the capture point is outside [m], how fast the robot sinks [m/s], by how much IMU and feet differ
-[rad], how far base_link is below `LEG` [m], for how long each has been too much, and for how long no foot has carried
-the robot [s]."""
+"""Models, limits (`step` is the first of `most` for who has a foot in the air) and memory; then for how long both feet
+have carried the robot [s], how far the capture point is outside [m], how fast the robot sinks [m/s], by how much IMU
+and feet differ [rad], how far base_link is below `LEG` [m], for how long each has been too much, and for how long no
+foot has carried the robot [s]."""
 _balance_at = view(BALANCE)
 LASTS = (0.03, 0.03, 0.3, 0.03)
 """Time for which each of the four may be too much [s] [own]."""
@@ -76,19 +77,19 @@ def no_balance(limits: SafetyLimits | None = None) -> Records:
     """Return the memory that has seen nothing, a `BALANCE`, with `limits`."""
     m = _blank().copy()
     if limits is not None:
-        m["most"] = _most(limits)
+        _put(m, limits)
     return m
 
 
-def _most(limits: SafetyLimits) -> Array:
-    alike = [limits.lean, LEG - limits.low]
-    return np.array([(*both, *alike) for both in zip(limits.capture, limits.sinking, strict=True)])
+def _put(m: Records, limits: SafetyLimits) -> None:
+    stands, m["step"] = limits.capture
+    m["most"] = stands, limits.sinking, limits.lean, LEG - limits.low
 
 
 def sensed(m: Records, state: LowState, dt: float | None, limits: SafetyLimits) -> Records:
     """Return `m` after the sample `state`, `dt` after the one before; None forgets those before."""
     m = m.copy()
-    m["most"] = _most(limits)
+    _put(m, limits)
     if dt is None:
         forget_feet(m["feet"])
         m["new"], m["lasted"] = 1, 0.0
@@ -187,14 +188,14 @@ def sense_balance(m: Record, q: Array, dq: Array, tau: Array, quat: Array, gyro:
     falls = m.airborne <= AIRBORNE
     if falls:
         m.outside = _outside(m, up, max(height, 0.2))
-    # A foot in the air comes down where it catches the robot, which sinks onto it.
+    # A foot in the air comes down where it catches the robot.
     one = feet.contact[0] < 0.5 or feet.contact[1] < 0.5
     m.stepped = 0.0 if one else m.stepped + dt
-    row = 1 if m.stepped < LANDING else 0
     if feet.weight[0] > 0.7 and feet.weight[1] > 0.7:
         m.leans = _leans(feet.motion.rotations, up)
     for k, much in enumerate((m.outside, m.sinks if falls else 0.0, m.leans, m.low if falls else 0.0)):
-        m.lasted[k] = m.lasted[k] + dt if much > m.most[row, k] else max(0.0, m.lasted[k] - dt)
+        most = m.step if k == 0 and m.stepped < LANDING else m.most[k]
+        m.lasted[k] = m.lasted[k] + dt if much > most else max(0.0, m.lasted[k] - dt)
 
 
 @njit(cache=True)
