@@ -14,6 +14,8 @@ from golem.errors import ConfigError, OutputError
 
 LONGEST = 4000
 """Characters of what is kept of a call or an answer; of longer ones their digest says which they were [own]."""
+TAIL = 1 << 20
+"""Longer than any line [bytes]."""
 
 
 class AuditLog:
@@ -24,10 +26,11 @@ class AuditLog:
         self._file, self.problem = file, ""
         try:
             file.parent.mkdir(parents=True, exist_ok=True)
-            self._out = os.open(file, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600)
-            whole, _, torn = file.read_bytes().rpartition(b"\n")
+            self._out = os.open(file, os.O_RDWR | os.O_APPEND | os.O_CREAT, 0o600)
+            size = os.fstat(self._out).st_size
+            torn = os.pread(self._out, min(size, TAIL), max(0, size - TAIL)).rpartition(b"\n")[2]
             if torn:  # the machine lost its power in the middle of a line
-                os.ftruncate(self._out, len(whole) + (1 if whole else 0))
+                os.ftruncate(self._out, size - len(torn))
                 first |= {"torn": torn.decode("utf-8", "replace")}
         except OSError as error:
             raise OutputError(f"Cannot write {file}: {error.strerror}.") from error
