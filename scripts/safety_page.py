@@ -8,6 +8,7 @@ from pathlib import Path
 
 from golem.hardware.safety.base import JOLT, SafetyLimits
 from golem.hardware.safety.gate import STAND
+from golem.hardware.safety.gate_balance import LEG, SUNK
 from golem.interfaces.payloads import Reason
 
 LIMITS = SafetyLimits.from_profile()
@@ -94,8 +95,8 @@ REASONS: dict[Reason, ReasonText] = {
     Reason.BALANCE: ReasonText(
         407,
         f"For 30 ms, by the gate's estimate: the capture point is {_L.capture[0]:g} m outside both soles, or "
-        f"{_L.capture[1]:g} m while a foot is in the air or landing. Or a robot on its feet sinks at "
-        f"{_L.sinking:g} m/s, or its base_link is under {_L.low:g} m.",
+        f"{_L.capture[1]:g} m while a foot is in the air or landing. Or a robot on its feet, its "
+        f"base_link under {LEG - SUNK:.2f} m, sinks at {_L.sinking:g} m/s, or is under {_L.low:g} m.",
         "The legs' controller does not balance: look at its log, and at what pushed.",
     ),
     Reason.STANDING: ReasonText(

@@ -61,7 +61,9 @@ def test_who_sinks_is_not_balanced() -> None:
         dq[[1, 7]], dq[[3, 9]], dq[[4, 10]] = -2.0, 4.0, -2.0
         return replace(make_state(0.0, Q + k * DT * dq, tau=TAU), dq=dq)
 
-    fault = unbalanced(watched(*map(bent, range(12))))
+    landing = watched(*map(bent, range(12)))
+    assert landing["sinks"][0] > LIMITS.sinking and unbalanced(landing) is None, "so does who lands from a step"
+    fault = unbalanced(watched(*map(bent, range(30))))
     assert fault is not None and fault.reason is Reason.BALANCE and "sinks" in fault.detail
 
 

@@ -55,6 +55,8 @@ SMOOTH = 0.03
 """Time constant of the velocity of the centre of mass [s] [own]."""
 FLAT = 0.08
 """Angle between two soles below which both stand flat on one floor [rad] [own]."""
+SUNK = 0.15
+"""How far base_link is below `LEG`, where a robot sinks that does not land from a step [m] [own: landing 0.14]."""
 LANDING = 0.1
 """Time for which a foot that has come down is still landing [s] [own]."""
 AIRBORNE = 0.3
@@ -193,7 +195,7 @@ def sense_balance(m: Record, q: Array, dq: Array, tau: Array, quat: Array, gyro:
     m.stepped = 0.0 if one else m.stepped + dt
     if feet.weight[0] > 0.7 and feet.weight[1] > 0.7:
         m.leans = _leans(feet.motion.rotations, up)
-    for k, much in enumerate((m.outside, m.sinks if falls else 0.0, m.leans, m.low if falls else 0.0)):
+    for k, much in enumerate((m.outside, m.sinks if falls and m.low > SUNK else 0.0, m.leans, m.low if falls else 0.0)):
         most = m.step if k == 0 and m.stepped < LANDING else m.most[k]
         m.lasted[k] = m.lasted[k] + dt if much > most else max(0.0, m.lasted[k] - dt)
 
