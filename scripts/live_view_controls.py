@@ -58,8 +58,7 @@ class Page:
     @property
     def t(self) -> float:
         """Robot time [s]."""
-        found = re.search(r"robot time ([0-9.]+) s", self.browser.text)
-        return float(found[1]) if found else -1.0
+        return self.number(r"robot time ([0-9.]+) s")
 
     def number(self, pattern: str) -> float:
         """Return a number in the text; NaN without one."""
