@@ -157,6 +157,11 @@ def test_split_and_merge(dataset: Path, tmp_path: Path) -> None:
         commands.merge(tmp_path / "x", (dataset, write(tmp_path / "plain", (3,), PLAIN)))
     with pytest.raises(OutputError, match="exists already"):
         commands.merge(tmp_path / "all", (dataset,))
+    with pytest.raises(OutputError, match="b exists already"):
+        commands.split(dataset, tmp_path / "new", tmp_path / "b")
+    with pytest.raises(GolemError, match="name two new folders"):
+        commands.split(dataset, tmp_path / "new", tmp_path / "a" / ".." / "new")
+    assert not (tmp_path / "new").exists()
 
 
 def full(*_: Any, **__: Any) -> None:

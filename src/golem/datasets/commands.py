@@ -312,8 +312,10 @@ def split(
     order, count = np.random.default_rng(seed).permutation(n), round(share * n)
     if not 0 < count < n:
         raise ConfigError(f"A share of {share:g} of {n} episodes leaves one part empty.")
+    if first.resolve() == second.resolve():
+        raise ConfigError(f"Both parts would be {first}; name two new folders.")
+    _refuse(first, second)
     for root, chosen in ((first, order[:count]), (second, order[count:])):
-        _refuse(root)
         rewritten(data, root, drafts(data, sorted(int(k) for k in chosen)))
         print(f"{len(chosen)} episodes in {root}.")
 
@@ -335,9 +337,10 @@ def merge(dataset: Positional[Path], sources: Positional[tuple[Path, ...]]) -> N
     print(f"{len(episodes)} episodes in {dataset}.")
 
 
-def _refuse(root: Path) -> None:
-    if root.exists():
-        raise OutputError(f"{root} exists already; give another name.")
+def _refuse(*roots: Path) -> None:
+    for root in roots:
+        if root.exists():
+            raise OutputError(f"{root} exists already; give another name.")
 
 
 COMMANDS: dict[str, Callable[..., object]] = {

@@ -61,13 +61,15 @@ def test_runs_that_cannot_be_paired_are_refused(runs: tuple[Path, Path], fake: C
 def test_whatever_else_differs_is_said(runs: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
     first, second = runs
     path = second / "trials.jsonl"
-    records = [
-        replace(r, overrides={"servo": "mine"}, versions={**r.versions, "numpy": "1"}) for r in read_records(path)
-    ]
+    other = {"overrides": {"servo": "mine"}, "options": {"layout": "varied", "climbs": 2}}
+    records = [replace(r, versions={**r.versions, "numpy": "1"}, **other) for r in read_records(path)]
     path.write_text("".join(r.line() for r in records))
+    path = first / "trials.jsonl"
+    path.write_text("".join(replace(r, options={"layout": "nominal"}).line() for r in read_records(path)))
     run_compare(CompareConfig(first, second))
     said = capsys.readouterr().out
     assert "different --use: none and servo=mine" in said and "different versions of numpy" in said
+    assert "different --layout: nominal and varied" in said and "--climbs" not in said
 
 
 def test_runs_of_different_code_are_no_comparison(runs: tuple[Path, Path]) -> None:

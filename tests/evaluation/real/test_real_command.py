@@ -119,6 +119,8 @@ def test_runs_that_are_none_or_of_two_profiles_are_refused(tmp_path: Path) -> No
     runs = (written(tmp_path / "a", [record(0, True)]), written(tmp_path / "b", [record(0, True, profile="ideal")]))
     with pytest.raises(GolemError, match="field and ideal"):
         run_real(RealConfig(runs=runs))
+    with pytest.raises(GolemError, match="Trial 0 of 'visual_servo' is in .*: give each run once"):
+        run_real(RealConfig(runs=(runs[0], tmp_path / "b" / ".." / "a")))
     half = tmp_path / "a" / "trials.jsonl"
     half.write_text(half.read_text()[:50] + "\n")
     with pytest.raises(GolemError, match="Line 1"):

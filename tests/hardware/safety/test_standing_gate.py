@@ -24,8 +24,11 @@ class Stands:
     failing: Exception | None = None
     stiffness = 200.0
     knee = 0.0
+    refusing: Exception | None = None
 
     def start(self, state: LowState) -> None:
+        if self.refusing:
+            raise self.refusing
         self.started = state
 
     def step(self, state: LowState, damping: Array) -> LowCommand:
@@ -142,6 +145,15 @@ def test_a_standing_controller_that_fails_damps_and_is_named(
 ) -> None:
     standing.tick(command=nan(command_at, standing.t + 0.002))
     vars(legs).update(fails)
+    result = standing.wait(0.02, command=None)
+    assert (result.state, result.reason) == (GateState.STOP1, Reason.STANDING)
+
+
+def test_a_standing_controller_that_does_not_start_is_not_asked_to_step(
+    standing: Any, legs: Stands, command_at: Make
+) -> None:
+    legs.refusing = GolemError("no posture to start from")
+    standing.tick(command=nan(command_at, standing.t + 0.002))
     result = standing.wait(0.02, command=None)
     assert (result.state, result.reason) == (GateState.STOP1, Reason.STANDING)
 

@@ -15,7 +15,7 @@ from golem.middleware.wire.convert import encode_low_state
 from golem.runtime.bringup.base import BringupConfig, BringupStep, StepFinding, StepRefused, Task, Workbench
 from golem.runtime.bringup.bringup_command import CHECKS, FILE, BringupReport, run_checks
 from golem.runtime.bringup.listening_checks import check_state
-from golem.runtime.bringup.motor_checks import check_motion
+from golem.runtime.bringup.motor_checks import answer_problem, check_motion
 from golem.types import NUM_JOINTS, TICK, Imu, LowState
 
 REFUSALS = {"refuses": StepRefused("the gate has ended"), "asks in vain": RosError("NOT STOPPED: press the button")}
@@ -155,3 +155,20 @@ def test_a_real_robot_needs_its_button_and_devices_have_names() -> None:
         BringupConfig(without=("camera",))
     with pytest.raises(ConfigError, match="share"):
         BringupConfig(share=1.0)
+
+
+@pytest.mark.parametrize(
+    ("moves", "words"),
+    [
+        ({3: 0.1, 4: 0.02}, ""),
+        ({3: -0.1}, "wrong sign"),
+        ({4: 0.1}, "left_ankle_pitch_joint moved instead"),
+        ({3: 0.1, 9: 0.12}, "right_knee_joint moved further"),
+    ],
+)
+def test_a_joint_that_was_sent_answers_alone(moves: dict[int, float], words: str) -> None:
+    moved = np.zeros(NUM_JOINTS)
+    for joint, angle in moves.items():
+        moved[joint] = angle
+    said = answer_problem(3, moved, 0.1)
+    assert words in said and bool(said) is bool(words)

@@ -110,7 +110,7 @@ def test_a_run_is_reproduced_by_its_seed_and_goes_on_from_its_checkpoint(
 def test_rows_of_the_curve_that_are_learned_again_are_left_out(tmp_path: Path) -> None:
     train(small(tmp_path, updates=20))
     with (tmp_path / CURVE).open("a") as file:  # it was killed between a curve and a checkpoint
-        file.write((tmp_path / CURVE).read_text().splitlines()[-1].replace("3840", "5760", 1) + "\n")
+        file.write((tmp_path / CURVE).read_text().splitlines()[-1].replace("3840", "5760", 1) + "\n3842,0.")
     train(small(tmp_path, updates=30))
     assert read_curve(tmp_path)["steps"].tolist() == pytest.approx([192 * k for k in range(1, 31)], rel=1e-4)
     (tmp_path / CHECKPOINT).unlink()  # it was killed before the first one

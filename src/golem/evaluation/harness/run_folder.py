@@ -12,7 +12,7 @@ import errno
 import fcntl
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -179,6 +179,19 @@ def make_folder(folder: Path) -> None:
         raise OutputError(f"Cannot write to --out {folder}: {error.strerror}; choose another.") from error
     if not os.access(folder, os.R_OK | os.W_OK | os.X_OK):
         raise OutputError(f"Cannot write to --out {folder}: Permission denied; choose another.")
+
+
+def records_of_runs(folders: Iterable[Path]) -> list[TrialRecord]:
+    """Return the trials of run folders, see `finished_records`. Raises ConfigError, too: a trial is in two of them."""
+    found: dict[tuple[object, ...], tuple[Path, TrialRecord]] = {}
+    for folder in folders:
+        for record in finished_records(folder):
+            trial = (record.rung, record.profile, record.seed, record.key, record.config, record.code)
+            if trial in found:
+                both = f"{found[trial][0]} and {folder}"
+                raise ConfigError(f"Trial {record.index} of '{record.method}' is in {both}: give each run once.")
+            found[trial] = folder, record
+    return [record for _, record in found.values()]
 
 
 def finished_records(folder: Path) -> list[TrialRecord]:

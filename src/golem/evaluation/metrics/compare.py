@@ -81,6 +81,10 @@ def _differences(a: TrialRecord, b: TrialRecord) -> list[str]:
     if a.overrides != b.overrides:
         sides = (" ".join(f"{k}={v}" for k, v in r.overrides.items()) or "none" for r in (a, b))
         found.append(f"The runs have different --use: {' and '.join(sides)}.")
+    for name in sorted(a.options.keys() & b.options.keys()):
+        if a.options[name] != b.options[name]:
+            option = name.replace("_", "-")
+            found.append(f"The runs have different --{option}: {a.options[name]} and {b.options[name]}.")
     for name in sorted(a.versions.keys() | b.versions.keys()):
         one, other = (r.versions.get(name, "none") for r in (a, b))
         if one != other:

@@ -15,7 +15,7 @@ from tyro.conf import Positional
 from golem.errors import ConfigError
 from golem.evaluation.base import RUNGS, make_rung
 from golem.evaluation.harness.records import TrialRecord, read_records
-from golem.evaluation.harness.run_folder import finished_records, read_costs, read_facts
+from golem.evaluation.harness.run_folder import finished_records, read_costs, read_facts, records_of_runs
 from golem.evaluation.metrics.summary import summarise
 from golem.evaluation.metrics.tables import run_tables
 from golem.output_file import write_file
@@ -91,7 +91,7 @@ def run_results(config: ResultsConfig) -> str:
     if not config.runs:
         raise ConfigError("Name at least one run folder.")
     if config.format == "csv":
-        text = trials_csv([record for folder in config.runs for record in finished_records(folder)])
+        text = trials_csv(records_of_runs(config.runs))
     else:
         parts = [section(folder, config.format == "latex") for folder in config.runs]
         total = GateHours.of(line for folder in config.runs for line in gate_costs(folder))

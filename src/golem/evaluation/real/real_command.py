@@ -17,7 +17,7 @@ from tyro.conf import Positional, arg
 from golem.errors import ConfigError, shorten, unknown_name
 from golem.evaluation.base import RUNGS, case_name, make_rung
 from golem.evaluation.harness.records import TrialRecord
-from golem.evaluation.harness.run_folder import finished_records
+from golem.evaluation.harness.run_folder import records_of_runs
 from golem.evaluation.metrics.prediction_powered import prediction_powered
 from golem.evaluation.metrics.published import GGX_F
 from golem.evaluation.metrics.statistics import Interval, wilson
@@ -141,9 +141,7 @@ def run_real(config: RealConfig) -> int:
             raise ConfigError(f"{config.template} is there already; choose another name.")
         print(f"Wrote {write_file(config.template, (SHIPPED / 'template.csv').read_text('utf-8'))}.")
         return 1
-    rows, twins = read_real(config.file), list[TrialRecord]()
-    for run in config.runs:
-        twins += finished_records(run)
+    rows, twins = read_real(config.file), records_of_runs(config.runs)
     profiles = sorted({record.profile for record in twins})
     if len(profiles) > 1:
         raise ConfigError(f"The runs are of the profiles {' and '.join(profiles)}; give those of one.")

@@ -90,7 +90,7 @@ def check(inputs: GateInputs, limits: SafetyLimits, memory: GateMemory) -> GateR
         asked = Fault(Reason.REQUESTED) if inputs.request is OperatorRequest.STOP else None
         faults = [asked, *faults, _standing(inputs, since, limits), memory.senses.unsteady]
         hard = next((f for f in faults if not _stands(f)), None)
-        fault = fault or command_fault
+        fault = fault or command_fault or memory.senses.unsteady
         if hard is not None:
             mode, since, reason, detail = GateState.STOP1, t, hard.reason, hard.detail
         elif edge is OperatorRequest.RESET and fault is None and _rests(state, t - since, limits):

@@ -35,6 +35,7 @@ class StandingGate:
         """Give the legs to what `make` makes, at the first stop that leaves them sound; None always damps."""
         self.gate, self._make = gate, make
         self._legs: StandingController | None = None
+        self._started = False
 
     @property
     def memory(self) -> GateMemory:
@@ -54,7 +55,7 @@ class StandingGate:
         """Run the gate, and the legs if they are the controller's."""
         before = self.gate.memory
         standing = None
-        if before.mode is GateState.STOP2 and self._legs is not None and before.state is not None:
+        if before.mode is GateState.STOP2 and self._legs is not None and self._started and before.state is not None:
             # By the state that was believed last: the newest may be an outlier.
             with contextlib.suppress(Exception):  # what a process that guards must outlive; the gate then damps
                 standing = self._legs.step(_believed(before.state), self.gate.limits.damping)
@@ -67,8 +68,10 @@ class StandingGate:
         if result.state is GateState.STOP2 and before.mode is not GateState.STOP2:
             self._make_legs()
             assert self._legs is not None and result.memory.state is not None
-            with contextlib.suppress(Exception):
+            self._started = False
+            with contextlib.suppress(Exception):  # who did not start is not asked to step: the gate then damps
                 self._legs.start(_believed(result.memory.state))
+                self._started = True
         return result
 
 

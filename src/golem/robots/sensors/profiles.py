@@ -222,6 +222,13 @@ def load_profile(name: str) -> RealismProfile:
     profile = replace(base, **convert_all(f"key of {name}", RealismProfile, rows, others))
     for values in (profile.zeros, profile.motors.torque_gains):
         per_joint(values)
+    for key in ("arm_offset", "leg_offset", "actuator_delay", "backlash"):
+        if getattr(profile, key) < 0.0:
+            raise ConfigError(f"{name}: {key} is {getattr(profile, key):g}; it is 0 or more.")
+    for key in ("leg_friction", "arm_friction"):
+        low, high = getattr(profile, key) or (0.0, 0.0)
+        if not 0.0 <= low <= high:
+            raise ConfigError(f"{name}: {key} is from {low:g} to {high:g}; it is a range from 0 or more upward.")
     return profile
 
 

@@ -168,7 +168,7 @@ def check_motion(bench: Workbench) -> StepFinding:
             link.pass_time(PULSE, send)
             if _stopped(bench) or float(np.abs(moved).max()) >= ANSWERS * SWING:
                 break
-        wrong = _stopped(bench) or _answer(joint, moved, by)
+        wrong = _stopped(bench) or answer_problem(joint, moved, by)
         worst = min(worst, float(moved[joint] / by))
     figures["least answer of a joint [1]"] = round(worst, 2)
     asked = time.monotonic()
@@ -188,7 +188,7 @@ def _stopped(bench: Workbench) -> str:
     return "" if gate is None or gate.state is GateState.ACTIVE else f"the gate stopped the robot: {gate.why}"
 
 
-def _answer(joint: int, moved: Array, by: float) -> str:
+def answer_problem(joint: int, moved: Array, by: float) -> str:
     """Return what is wrong with the answer to a command that sent one joint by `by` [rad]; empty if nothing is."""
     most = int(np.argmax(np.abs(moved)))
     if moved[joint] * by < 0.0 and abs(moved[joint]) > 0.02:
@@ -196,4 +196,6 @@ def _answer(joint: int, moved: Array, by: float) -> str:
     if abs(moved[joint]) < ANSWERS * SWING:
         other = f"; {JOINT_NAMES[most]} moved instead" if abs(moved[most]) > ANSWERS * SWING else ""
         return f"{JOINT_NAMES[joint]} was sent by {by:+.2f} rad and moved by {moved[joint]:+.3f}{other}"
+    if most != joint:
+        return f"{JOINT_NAMES[joint]} was sent by {by:+.2f} rad, and {JOINT_NAMES[most]} moved further: {moved[most]:+.2f}"
     return ""

@@ -82,7 +82,10 @@ class SenderWatch:
 
     def _run(self) -> None:
         while not self._over.wait(PERIOD):
-            self.found = tuple(unknown_senders(self._participant))
+            try:
+                self.found = tuple(unknown_senders(self._participant))
+            except Exception as error:  # a look that failed must not read like nobody who sends
+                self.found = (f"not known, the look failed: {error or type(error).__name__}",)
 
 
 ROBOT_LIMITS = "urdf"

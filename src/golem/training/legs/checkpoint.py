@@ -10,6 +10,7 @@ import numpy as np
 import torch
 
 from golem.errors import ConfigError
+from golem.evaluation.harness.records import whole_lines
 from golem.types import Array
 
 CHECKPOINT = "checkpoint.pt"
@@ -44,10 +45,13 @@ def read_curve(run: Path) -> dict[str, Array]:
 
 
 def cut_curve(path: Path, steps: int) -> None:
-    """Leave out of the curve at `path`, if there is one, what came after `steps`: it is done again."""
-    if not path.exists():
+    """Leave out of the curve at `path`, if there is one, what came after `steps`, and half a line: it is done again."""
+    text = path.read_bytes() if path.exists() else b""
+    whole = text[: whole_lines(text)].decode()
+    if not whole:
+        path.unlink(missing_ok=True)
         return
-    head, *rows = path.read_text().splitlines(keepends=True)
+    head, *rows = whole.splitlines(keepends=True)
     column = head.strip().split(",").index("steps")
     kept = [row for row in rows if float(row.split(",")[column]) <= steps * (1.0 + 1e-4)]
     part = path.with_suffix(".part")
