@@ -353,10 +353,22 @@ def test_beside_a_gantry_only_what_it_is_done_with_is_taken_and_nothing_near_it(
     assert world.t > 30.0 + SILENT
 
 
-def test_words_of_a_gantry_that_say_nothing_are_left_out() -> None:
+def test_a_job_that_goes_on_knows_what_the_gantry_was_done_with(tmp_path: Path) -> None:
+    write_list(tmp_path / "list.csv", PLACES)
+    book = JobFile(tmp_path / "pack.sqlite", read_list(tmp_path / "list.csv", ()))
+    book.loosen("Screw_3")
+    book.close()
+    world = JobWorld(PLACES, tmp_path)
+    result = world.run(DisassembleGoal(list="list.csv", job="pack.sqlite", loosened="gantry"), 30_000)
+    ends = result.value.fates
+    assert [k for k, end in enumerate(ends) if end == "in_tray"] == [1] and set(ends) == {"in_tray", "open"}
+
+
+def test_words_of_a_gantry_that_say_nothing_are_left_out(tmp_path: Path) -> None:
     bus = Bus()
     context = Context(bus, Kinematics(), 0.01, modules())
-    listens = Gantry(context, {"A"})
+    book = JobFile(tmp_path / "pack.sqlite", [Listed("A", "screw", 0.1, 0.2, 0.0)])
+    listens = Gantry(context, book)
     for k, text in enumerate(
         ("", "Remove: ", "Remove: A with confidence = 0.5", "x" * 100_000, "Remove: A with confidence = nan")
     ):
@@ -364,22 +376,22 @@ def test_words_of_a_gantry_that_say_nothing_are_left_out() -> None:
         context.refresh(float(k))
         bus.deliver(float(k))
         listens()
-    assert (listens.at, listens.loosened) == ("A", set())
+    assert (listens.at, book.loosened) == ("A", set())
 
 
 def test_a_gantry_is_understood_where_a_listed_name_has_blanks(tmp_path: Path) -> None:
     (tmp_path / "list.csv").write_text("class,x,y,z,name\nscrew,0.1,0.2,0,Cover  screw 7\nscrew,0.1,0.4,0,B\n")
-    names = {one.name for one in read_list(tmp_path / "list.csv", ())}
+    book = JobFile(tmp_path / "pack.sqlite", read_list(tmp_path / "list.csv", ()))
     bus = Bus()
     context = Context(bus, Kinematics(), 0.01, modules())
-    listens, at = Gantry(context, names), list[str]()
+    listens, at = Gantry(context, book), list[str]()
     for k, name in enumerate(("Cover screw 7", "B", "Cover  screw 7")):
         bus.publish(topics.REMOVALS, f"Remove: {name} with confidence = 0.9", float(k))
         context.refresh(float(k))
         bus.deliver(float(k))
         listens()
         at.append(listens.at)
-    assert at == ["Cover screw 7", "B", "Cover screw 7"] and listens.loosened == {"Cover screw 7", "B"}
+    assert at == ["Cover screw 7", "B", "Cover screw 7"] and book.loosened == {"Cover screw 7", "B"}
 
 
 def test_frames_are_related_by_three_places_that_are_known_in_both() -> None:

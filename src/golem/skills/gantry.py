@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection
 
 from golem.interfaces import topics
 from golem.middleware.bus import News
 from golem.skills.context import Context
+from golem.skills.job_file import JobFile
 
 SENTENCE = re.compile(r"\s*Remove: (\S.{0,59}) with confidence = (\S{1,20})\s*")
 """On the topic `/triggered_behavior`."""
@@ -22,20 +22,21 @@ class Gantry:
 
     Attributes:
         at: name of the fastener it is at, where it stays until it says another one; empty before its first word.
-        loosened: names of those it is done with.
         t: time of its last word [s], first that of the beginning.
     """
 
-    def __init__(self, context: Context, names: Collection[str]) -> None:
-        """Hear what comes from now on, in the stack of `context`, of the fasteners called `names`."""
-        self._context, self._names, self._news = context, names, News(context.bus, topics.REMOVALS)
-        self.at, self.loosened, self.t = "", set[str](), context.t
+    def __init__(self, context: Context, book: JobFile) -> None:
+        """Hear what comes from now on, in the stack of `context`, of the fasteners of `book`, which keeps it."""
+        self._context, self._book, self._news = context, book, News(context.bus, topics.REMOVALS)
+        self._names = {one.listed.name for one in book.fasteners}
+        self.at, self.t = "", context.t
 
     def __call__(self) -> None:
         said = SENTENCE.fullmatch((self._news.read() or "")[:200])
         name = " ".join(said[1].split()) if said else ""  # as in a list
         if name in self._names:
-            self.loosened |= {self.at} - {name, ""}
+            if self.at not in (name, ""):
+                self._book.loosen(self.at)
             self.at, self.t = name, self._context.t
 
     @property

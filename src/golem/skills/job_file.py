@@ -96,6 +96,7 @@ class JobFile(SqliteFile):
     Attributes:
         fasteners: all, in the order of the list.
         containers: what else was listed.
+        loosened: names of the fasteners that a gantry is done with.
     """
 
     fault, what, version, synchronous = JobFault, "job", 2, "FULL"
@@ -105,9 +106,11 @@ class JobFile(SqliteFile):
         "events (id INTEGER PRIMARY KEY, number INTEGER NOT NULL REFERENCES listed, fate TEXT NOT NULL,"
         " reason TEXT NOT NULL, side TEXT NOT NULL, tray TEXT NOT NULL, x REAL, y REAL, yaw REAL, t REAL NOT NULL,"
         " happened TEXT NOT NULL DEFAULT CURRENT_TIMESTAMP, picture TEXT NOT NULL)",
+        "loosened (name TEXT PRIMARY KEY)",
     )
     fasteners: list[PackFastener]
     containers: list[Listed]
+    loosened: set[str]
 
     def __init__(self, path: Path, listed: Sequence[Listed] = ()) -> None:
         """Open or make the job at `path`; a new one is of what is `listed`, an old one of nothing else.
@@ -148,6 +151,13 @@ class JobFile(SqliteFile):
         for number, fate, reason, side, tray, x, y, yaw, t, when, picture in self._base.execute(told):
             stance = None if x is None else PlanarPose(float(x), float(y), float(yaw))
             _take(by_number[number], Fate(fate), reason, side, tray, stance, t, when, picture)
+        self.loosened = {name for (name,) in self._base.execute("SELECT name FROM loosened")}
+
+    def loosen(self, name: str) -> None:
+        """Keep, for good, that a gantry is done with a fastener. Raises JobFault: the disk is full or not writable."""
+        with self._faults():
+            self._base.execute("INSERT OR IGNORE INTO loosened VALUES (?)", (name,))
+        self.loosened.add(name)
 
     def tell(
         self,

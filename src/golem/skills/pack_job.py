@@ -75,7 +75,7 @@ class PackJob:
     def __init__(self, context: Context, goal: DisassembleGoal, book: JobFile) -> None:
         """Go on with what `book` has open."""
         self._context, self._goal, self._book = context, goal, book
-        self.report, self._gantry = DisassembleReport(), Gantry(context, {one.listed.name for one in book.fasteners})
+        self.report, self._gantry = DisassembleReport(), Gantry(context, book)
         self._sides = PackSides(np.array([one.place for one in book.fasteners]))
         self._T_odom_pack = PlanarPose(0.0, 0.0, 0.0)
         self._rim = SeenRim()  # above base_link, had the legs no height
@@ -116,7 +116,7 @@ class PackJob:
 
     def _wanted(self, one: PackFastener) -> bool:
         """Return whether a fastener is to be taken now."""
-        said = {"list": one.listed.loose is True, "gantry": one.listed.name in self._gantry.loosened}
+        said = {"list": one.listed.loose is True, "gantry": one.listed.name in self._book.loosened}
         claimed = said.get(self._goal.loosened, True)
         return one.fate in TO_DO and claimed and bool(self._container(one.label))
 
