@@ -96,7 +96,7 @@ class Browser:
         """What can be read."""
         return self.js("document.body.innerText")
 
-    def click(self, label: str, inside: str = "") -> None:
+    def click(self, label: str, inside: str = "", seconds: float = SLOW) -> None:
         """Click what has a text, or what `inside` (a CSS selector) its row is meant, as a mouse does."""
         find = f"{ROW}({json.dumps(label)}, {json.dumps(inside)})"
         places: list[Any] = [None]
@@ -105,16 +105,19 @@ class Browser:
             places.append(self.js(find))
             return places[-1] is not None and places[-1] == places[-2]
 
-        if not self.wait(rests):
+        if not self.wait(rests, seconds):
             raise TimeoutError(f"no control '{label}'")
         x, y = places[-1]
         for kind in ("mousePressed", "mouseReleased"):
             self.do("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
 
     def choose(self, label: str, option: str) -> None:
-        """Choose of a list."""
-        self.click(label, "input")
-        self.click(option)
+        """Choose of a list, which a folder that still opens shuts again."""
+        for _ in range(3):
+            self.click(label, "input")
+            with suppress(TimeoutError):
+                return self.click(option, seconds=10.0)
+        raise TimeoutError(f"no '{option}' in '{label}'")
 
     def enter(self, label: str, value: str) -> None:
         """Write a number beside a slider."""

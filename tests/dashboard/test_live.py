@@ -190,6 +190,7 @@ def test_a_skill_can_be_cancelled_and_the_robot_stays_up(twin: tuple[LockstepRun
     assert (result.success, result.stage) == (False, "cancelled") and running.executor.t < 0.7
     assert running.safety is not None and running.safety.state is GateState.ACTIVE
     assert enabled[-1] and view.panel.skill.cancel.disabled
+    assert view._note == result.reason, "the page says how it ended"
 
 
 @pytest.fixture

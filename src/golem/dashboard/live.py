@@ -170,7 +170,9 @@ class LiveView(AbstractContextManager["LiveView", None]):
             self.tick()
 
         try:
-            return self._running.execute(skill, goal, watch=both)
+            result = self._running.execute(skill, goal, watch=both)
+            self._note = result.reason
+            return result
         finally:
             self._busy = False
             self._ended = self._running.executor.t

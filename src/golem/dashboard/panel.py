@@ -262,10 +262,9 @@ def _status_html(
         f"<b>{escape(meaning)}</b>"
         f'<div style="font-size:12px">{escape(f"{status.safety} {status.reason}".rstrip())}</div></div>',
     ]
-    if status.safety.stopped and not note:
-        note = "Release the emergency stop, then reset and activate; a robot that fell needs Start over."
-    if note:
-        parts.append(f'<div style="margin:6px 0;color:#c25a10"><b>{escape(note)}</b></div>')
+    advice = "Release the emergency stop, then reset and activate; a robot that fell needs Start over."
+    for line in filter(None, (note, advice if status.safety.stopped else "")):
+        parts.append(f'<div style="margin:6px 0;color:#c25a10"><b>{escape(line)}</b></div>')
     if stages:
         parts.append(f'<div><b style="font-size:16px">{escape(status.stage)}</b> {escape(status.text)}</div>')
         parts.append(_timeline_html(stages[-RECENT:]))
