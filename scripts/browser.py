@@ -120,13 +120,18 @@ class Browser:
         raise TimeoutError(f"no '{option}' in '{label}'")
 
     def enter(self, label: str, value: str) -> None:
-        """Write a number beside a slider."""
-        self.click(label, "input:not([type=hidden]):not([type=range])")
-        self.js("document.activeElement.select()")
-        self.do("Input.insertText", text=value)
-        for kind in ("rawKeyDown", "keyUp"):
-            self.do("Input.dispatchKeyEvent", type=kind, code="Enter", key="Enter", windowsVirtualKeyCode=13)
-        self.js("document.activeElement.blur()")
+        """Write a number beside a slider, again where a folder that still opens has dropped it."""
+        for _ in range(3):
+            self.click(label, "input:not([type=hidden]):not([type=range])")
+            self.js("(window.entered = document.activeElement).select()")
+            self.do("Input.insertText", text=value)
+            for kind in ("rawKeyDown", "keyUp"):
+                self.do("Input.dispatchKeyEvent", type=kind, code="Enter", key="Enter", windowsVirtualKeyCode=13)
+            self.js("document.activeElement.blur()")
+            time.sleep(1.0)
+            if self.js(f"window.entered.isConnected && Number(window.entered.value) === {float(value)}"):
+                return
+        raise TimeoutError(f"'{label}' does not keep {value}")
 
     def picture(self, width: int) -> NDArray[np.uint8]:
         """Return (h, width, 3) BGR, the left part of what is seen."""
