@@ -119,6 +119,15 @@ def test_a_long_gap_silences_it_and_it_says_so() -> None:
     assert "No scan has fitted" in odometry.why
 
 
+def test_without_scans_it_does_not_keep_every_sample_and_goes_on_when_they_come_back() -> None:
+    odometry = Lio(LioConfig(silent_at=0.5))
+    told = run(odometry, 8.0, change=lambda scan: None if 4.0 <= scan.t < 6.6 else scan)
+    assert told[60] is None and len(odometry._buffer) < 300
+    assert abs(off(told[-1])) < 0.05
+    run(odometry := Lio(LioConfig(silent_at=0.5)), 6.0, change=lambda scan: None)
+    assert len(odometry._buffer) < 300, "of 200 a second for 6 s"
+
+
 def test_a_frozen_scan_is_left_out_and_silences_it() -> None:
     held: list[LidarScan] = []
 

@@ -82,6 +82,8 @@ _MATCHED = 100
 """Fewest points that make an update."""
 WALKING = 0.1
 """Speed by the legs from which a robot does not stand [m/s]."""
+KEPT = 2.0
+"""Samples are kept for a scan of theirs for so many times `silent_at`; a scan that is older is left out [own]."""
 _GAP = 0.1
 """Time between two IMU samples from which motion in between is not known [s]."""
 
@@ -140,6 +142,9 @@ class Lio(Ignores):
         self._buffer.append(sample)
         self._move(self._ahead, sample)
         self._judge(self._ahead)
+        if sample.t - self._buffer[0].t > KEPT * self.config.silent_at:
+            self._filter = self._ahead.copy()
+            self._buffer.clear()
 
     def add_legs(self, legs: LegOdometry) -> None:
         if not all(map(math.isfinite, [*legs.velocity.tolist(), legs.waist])):
