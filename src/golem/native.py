@@ -39,18 +39,11 @@ _LEG_JOINTS, _UPPER_JOINTS = LEGS.stop - LEGS.start, UPPER.stop - UPPER.start
 
 
 def _layout(*rows: tuple[str, Any]) -> np.dtype[Any]:
-    """Return the packed dtype of `rows`, where the fields up to `end_state` also are one field `state`."""
-    names, formats, offsets = [], [], []
-    at = 0
-    for name, kind in rows:
-        names.append(name)
-        formats.append(kind)
-        offsets.append(at)
-        at += np.dtype(kind).itemsize
-    names.append("state")
-    formats.append(("f8", (STATE,)))
-    offsets.append(offsets[names.index("q")])
-    return np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": at})
+    """Return the packed dtype of `rows`, where the numbers from `q` on, a state's, also are one field `state`."""
+    plain: Any = np.dtype(list(rows))
+    names, formats = [*plain.names, "state"], [*(kind for _, kind in rows), _f8(STATE)]
+    offsets = [plain.fields[name][1] for name in (*plain.names, "q")]
+    return np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": plain.itemsize})
 
 
 def _f8(*shape: int) -> tuple[str, tuple[int, ...]]:
