@@ -15,7 +15,7 @@ from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from golem.errors import GolemError, ModuleFault, SlowModule, unknown_name
+from golem.errors import GolemError, ModuleFault, SlowModule, check_known, unknown_name
 
 T = TypeVar("T")
 
@@ -273,8 +273,7 @@ def _dispatch(words: list[str]) -> int:
 
         print(__version__)
         return 0
-    if words[0] not in COMMANDS:
-        raise unknown_name("command", words[0], COMMANDS)
+    check_known("command", COMMANDS, words[0])
     return COMMANDS[words[0]](words[1:])
 
 
@@ -284,8 +283,7 @@ def _named(words: list[str], command: str, what: str, names: Collection[str]) ->
     if word in ("-h", "--help"):
         print(f"usage: golem {command} {{{','.join(names)}}} [options]")
         return None
-    if word not in names:
-        raise unknown_name(what, word, names)
+    check_known(what, names, word)
     return word
 
 

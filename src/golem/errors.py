@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 from golem.traces import Trace, describe, trace_of
 
@@ -124,3 +124,10 @@ def unknown_name(kind: str, name: str, valid: Iterable[str]) -> ConfigError:
     near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
     hint = f" Did you mean '{near[0]}'?" if near else ""
     return ConfigError(f"Unknown {kind} '{name}'; valid: {', '.join(names) or '(none)'}.{hint}")
+
+
+def check_known(kind: str, valid: Collection[str], *names: str) -> None:
+    """Check that each of `names` is one of `valid`. Raises ConfigError: one is not; see `unknown_name`."""
+    for name in names:
+        if name not in valid:
+            raise unknown_name(kind, name, valid)

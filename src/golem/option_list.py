@@ -15,7 +15,7 @@ from typing import Annotated, Any
 from tyro.conf import Positional, arg
 
 from golem import registry
-from golem.errors import GolemError, unknown_name
+from golem.errors import GolemError, check_known
 from golem.options import dataclass_in, notes
 from golem.slots import KEYS, PARTS, SLOTS
 from golem.stack import SKILLS
@@ -58,8 +58,7 @@ def options_text(config: OptionsConfig) -> str:
     if name in PARTS:
         cls = registry.part_class(name)
         return _page(name, cls, options_of(cls))
-    if name not in SLOTS:
-        raise unknown_name("slot", name, {**KEYS, **SLOTS, **PARTS})
+    check_known("slot", {**KEYS, **SLOTS, **PARTS}, name)
     if config.use is None:
         return _slot(name)
     cls = registry.load(name, config.use)

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from golem import registry
-from golem.errors import ConfigError, GolemError, unknown_name
+from golem.errors import ConfigError, GolemError, check_known, unknown_name
 from golem.options import check_values, read_yaml
 from golem.robots.base import Standing
 from golem.slots import KEYS, PARTS
@@ -163,8 +163,7 @@ class Stack:
         value = read_yaml(use, f"'{use}'") if isinstance(use, str) and use.startswith("{") else use
         if key == SKILLS:
             return replace(self, skills={**self.skills, **_skills(f"'{use}'", value)})
-        if key not in KEYS:
-            raise unknown_name("slot", key, (*KEYS, SKILLS))
+        check_known("slot", (*KEYS, SKILLS), key)
         choice = value if isinstance(value, Choice) else _choice(f"'{use}'", key, KEYS[key].slot, value)
         return replace(self, choices={**self.choices, key: choice})
 

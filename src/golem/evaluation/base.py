@@ -19,7 +19,7 @@ from typing import Any, ClassVar, Generic, TypeVar, cast
 import numpy as np
 
 from golem import registry
-from golem.errors import unknown_name
+from golem.errors import check_known
 from golem.evaluation.metrics.text_table import TextTable
 from golem.evaluation.rung_table import PROFILES, RUNGS
 from golem.options import fill
@@ -220,8 +220,7 @@ class Rung(ABC, Generic[O]):
 
 def rung_class(name: str) -> type[Rung[Any]]:
     """Import the rung called `name`. Raises ConfigError: there is no such rung."""
-    if name not in RUNGS:
-        raise unknown_name("rung", name, RUNGS)
+    check_known("rung", RUNGS, name)
     return _load(RUNGS[name])
 
 

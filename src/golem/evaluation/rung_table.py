@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from golem import registry
-from golem.errors import ConfigError, unknown_name
+from golem.errors import ConfigError, check_known, unknown_name
 from golem.package_data import load_data
 
 PROFILES = ("ideal", "bench", "field")
@@ -38,11 +38,8 @@ def refuse_early(words: Sequence[str]) -> None:
                 what = "a whole number" if kind is int else "a number"
                 raise ConfigError(f"{option} is {what}, not '{value}'.") from None
     rung = (given.get("--rung") or ["tether"])[-1]
-    if rung not in RUNGS:
-        raise unknown_name("rung", rung, RUNGS)
-    for value in given.get("--profile", ())[:1]:
-        if value not in PROFILES:
-            raise unknown_name("profile", value, PROFILES)
+    check_known("rung", RUNGS, rung)
+    check_known("profile", PROFILES, *given.get("--profile", ())[:1])
     slot = next((slot for slot, rungs in COMPARED.items() if rung in rungs), None)
     for method in given.get("--method", ()) if slot else ():
         if ":" not in method and not method.endswith(".py") and method not in registry.names(slot or ""):

@@ -13,7 +13,7 @@ from typing import Annotated
 import numpy as np
 from tyro.conf import Positional, arg
 
-from golem.errors import ConfigError, unknown_name
+from golem.errors import ConfigError, check_known
 from golem.evaluation.base import Key, rung_class
 from golem.evaluation.blame.game import EXACT, Coalition, Points, Strata, coalitions, orders_of, points, shapley
 from golem.evaluation.blame.oracles import ORACLES, NotHere
@@ -152,8 +152,7 @@ class Trials:
         """Return the oracles that exchange something in every method's stack."""
         found: list[str] = []
         for name in self._config.only or ORACLES:
-            if name not in ORACLES:
-                raise unknown_name("oracle", name, ORACLES)
+            check_known("oracle", ORACLES, name)
             try:
                 self._prepare(frozenset([name]))
                 found.append(name)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from golem import registry
-from golem.errors import ConfigError, unknown_name
+from golem.errors import ConfigError, check_known
 from golem.package_data import load_data
 from golem.robots.mujoco.config import WITH_PACK
 from golem.robots.sensors.profiles import load_profile
@@ -63,8 +63,7 @@ def with_modules(stack: Stack, overrides: Mapping[str, str]) -> Stack:
         oracles = f"{oracles}+detections".strip("+")
     stack = stack.with_choices(others)
     for name in oracles.split("+") if oracles else ():
-        if name not in ORACLES:
-            raise unknown_name("oracle", name, ORACLES)
+        check_known("oracle", ORACLES, name)
         one, robot, before = ORACLES[name], stack.choice("robot"), stack
         if robot.use not in ("mujoco", ALTERED):
             raise ConfigError(f"Only robot: mujoco can be altered for --use oracle=..., not {robot.use}.")

@@ -12,7 +12,7 @@ from types import FrameType
 from typing import cast
 
 from golem import registry
-from golem.errors import ConfigError, MissingExtra, MissingSystemLibrary, ModuleFault, unknown_name
+from golem.errors import ConfigError, MissingExtra, MissingSystemLibrary, ModuleFault, check_known
 from golem.evaluation.conformance import base
 from golem.evaluation.conformance.suite import Suite
 from golem.evaluation.no_search import searching_forbidden
@@ -67,8 +67,7 @@ UNCHECKED: dict[str, dict[str, str]] = _DATA["unchecked"]
 
 def suite_of(slot: str) -> Suite:
     """Return the suite of `slot`. Raises ConfigError: there is no such slot."""
-    if slot not in SUITES:
-        raise unknown_name("slot", slot, SUITES)
+    check_known("slot", SUITES, slot)
     module, _, name = SUITES[slot].partition(":")
     return getattr(import_module(module), name)()
 

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 
 import tyro
 
-from golem.errors import ConfigError, OutputError, unknown_name
+from golem.errors import ConfigError, OutputError, check_known
 from golem.evaluation.conformance.examine import SUITES
 from golem.package_data import load_data
 
@@ -37,8 +37,7 @@ def run_new(config: NewConfig, folder: Path = Path()) -> list[Path]:
         OutputError: they cannot be written.
     """
     slot, name = config.slot, config.name
-    if slot not in SUITES:
-        raise unknown_name("slot", slot, SUITES)
+    check_known("slot", SUITES, slot)
     if not re.fullmatch(r"[a-z][a-z0-9_]*", name) or keyword.iskeyword(name):
         raise ConfigError(f"A module's name is lower-case words joined by _ and no word of Python's; not '{name}'.")
     words = {"slot": slot, "name": name, "cls": "".join(word.capitalize() for word in name.split("_"))}

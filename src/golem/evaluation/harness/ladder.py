@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal, cast
 import tyro
 from tyro.conf import Suppress, arg
 
-from golem.errors import ConfigError, MissingExtra, unknown_name
+from golem.errors import ConfigError, MissingExtra, check_known, unknown_name
 from golem.evaluation.base import RUNGS, Rung, TrialSpec, case_name, make_rung, option_values, rung_class
 from golem.evaluation.harness.arguments import replaced_modules
 from golem.evaluation.harness.records import Provenance, TrialRecord, read_records, trial_name
@@ -243,8 +243,7 @@ def prepare(config: LadderConfig) -> tuple[Request, Provenance]:
             raise unknown_name("method", method, rung.methods())
         if config.method.count(method) > 1:
             raise ConfigError(f"--method names '{method}' more than once.")
-    if profile not in rung.profiles:
-        raise unknown_name("profile", profile, rung.profiles)
+    check_known("profile", rung.profiles, profile)
     if rung.timed and (config.j, config.executor) != (1, "local"):
         raise ConfigError(f"Rung {rung.name} times this machine: leave out -j and --executor.")
     resolved = {method: facts(rung, method, profile, overrides, options) for method in config.method}

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from golem.errors import ConfigError, OutputError, unknown_name
+from golem.errors import ConfigError, OutputError, check_known
 from golem.evaluation.base import RUNGS, TrialOutcome, TrialSpec, case_name
 from golem.evaluation.harness.records import Provenance, TrialRecord, artefacts, read_records, whole_lines
 from golem.output_file import write_file
@@ -218,8 +218,7 @@ def finished_records(folder: Path) -> list[TrialRecord]:
     records = read_records(trials)
     if not records:
         raise ConfigError(none)
-    if records[0].rung not in RUNGS:
-        raise unknown_name(f"rung of {trials}", records[0].rung, RUNGS)
+    check_known(f"rung of {trials}", RUNGS, records[0].rung)
     return records
 
 

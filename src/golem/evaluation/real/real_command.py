@@ -14,7 +14,7 @@ from typing import Annotated, Literal
 import numpy as np
 from tyro.conf import Positional, arg
 
-from golem.errors import ConfigError, shorten, unknown_name
+from golem.errors import ConfigError, check_known, shorten, unknown_name
 from golem.evaluation.base import RUNGS, case_name, make_rung
 from golem.evaluation.harness.records import TrialRecord
 from golem.evaluation.harness.run_folder import records_of_runs
@@ -114,8 +114,7 @@ def _row(where: str, line: dict[str, str]) -> RealRow:
     values = {"n": 1, **values} if cells.get("stat") == "trial" else values
     row: RealRow = fill(f"column in {where}", RealRow, values)
     check_finite(f"The value in {where}", np.array([row.value, row.sd or 0.0]))
-    if row.rung not in RUNGS:
-        raise unknown_name(f"rung in {where}", row.rung, RUNGS)
+    check_known(f"rung in {where}", RUNGS, row.rung)
     methods = _methods(row.rung)
     if row.method not in (*methods, "GGX-F") and ":" not in row.method and not row.method.startswith("{"):
         raise unknown_name(f"method in {where}", row.method, methods)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from golem.errors import ConfigError, unknown_name
+from golem.errors import ConfigError, check_known
 from golem.hardware.servo.gains import default_gains
 from golem.interfaces import public
 from golem.middleware.dds.base import Qos
@@ -62,8 +62,7 @@ class MiswiredTwinConfig(MujocoConfig):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.fault not in FAULTS:
-            raise unknown_name("fault of a bring-up", self.fault, FAULTS)
+        check_known("fault of a bring-up", FAULTS, self.fault)
 
 
 class MiswiredTwin(MujocoRobot):
@@ -243,8 +242,7 @@ def run_bringup_command(config: BringupCommandConfig) -> bool:
         ConfigError: an option is wrong.
         DdsError, OutputError: see `run_bringup`.
     """
-    if config.fault not in FAULTS:
-        raise unknown_name("fault of a bring-up", config.fault, FAULTS)
+    check_known("fault of a bring-up", FAULTS, config.fault)
     if not config.rehearse:
         if config.fault != "none":
             raise ConfigError("A fault is built into a twin only: add --rehearse.")

@@ -15,7 +15,7 @@ import mujoco
 import numpy as np
 
 from golem import registry
-from golem.errors import ConfigError, unknown_name
+from golem.errors import ConfigError, check_known
 from golem.evaluation.base import Case, Results, TrialSpec
 from golem.evaluation.episodes.counter_watch import CounterWatch
 from golem.evaluation.episodes.episode import episode_seed
@@ -82,9 +82,7 @@ class CounterRung(KitchenRung[CounterOptions]):
 
     def cases(self, results: Results) -> Sequence[Case]:
         kinds = self.options.thing
-        for kind in kinds:
-            if kind not in KINDS:
-                raise unknown_name("thing", kind, KINDS)
+        check_known("thing", KINDS, *kinds)
         if not self.options.each:
             return [{"thing": kind} for kind in kinds] or ({},)
         return [{"thing": kind, "hand": hand} for kind in kinds or KINDS for hand in ("left", "right")]

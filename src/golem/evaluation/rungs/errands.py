@@ -18,7 +18,7 @@ from golem.agent.desk import Desk
 from golem.agent.sentences import ErrandReport, SentencePlanner
 from golem.agent.stack_body import StackBody
 from golem.agent.tool_rules import Rules
-from golem.errors import unknown_name
+from golem.errors import check_known
 from golem.evaluation.base import DONE, Case, Results, TrialSpec
 from golem.evaluation.episodes.counter_watch import LIFTED, CounterWatch, ErrandWatch
 from golem.evaluation.episodes.oracle import Oracle, whereabouts
@@ -127,9 +127,7 @@ class ErrandsRung(KitchenRung[ErrandsOptions]):
         return True
 
     def cases(self, results: Results) -> Sequence[Case]:
-        for name in self.options.errand:
-            if name not in SUITE:
-                raise unknown_name("errand", name, SUITE)
+        check_known("errand", SUITE, *self.options.errand)
         return [{"errand": name} for name in self.options.errand or SUITE]
 
     def arranged(self, spec: TrialSpec, stack: Stack) -> Stack:

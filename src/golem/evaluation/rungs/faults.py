@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from golem.errors import ConfigError, unknown_name
+from golem.errors import ConfigError, check_known
 from golem.evaluation.base import DONE, Case, Outcomes, Results, Rung, TrialOutcome, TrialSpec
 from golem.evaluation.blame.oracles import with_modules
 from golem.evaluation.episodes.episode import episode_seed
@@ -225,9 +225,7 @@ class FaultsRung(Rung[FaultOptions]):
 
     def __init__(self, options: FaultOptions | None = None) -> None:
         super().__init__(options)
-        for posture in self.options.posture:
-            if posture not in POSTURES:
-                raise unknown_name("posture", posture, POSTURES)
+        check_known("posture", POSTURES, *self.options.posture)
         self.faults = [name for name in FAULTS if self.options.only in name]
         if not self.faults:
             raise ConfigError(f"No fault has '{self.options.only}' in its name; golem faults --help lists none.")

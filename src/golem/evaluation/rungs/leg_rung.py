@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from golem.capabilities.legs.base import Envelope
-from golem.errors import ConfigError, unknown_name
+from golem.errors import ConfigError, check_known
 from golem.evaluation.base import DONE, Rung, TrialOutcome, TrialSpec
 from golem.evaluation.episodes.episode import LATENCY, Episode, Loss, episode_seed, legs_stack
 from golem.evaluation.harness.arguments import robot_options
@@ -64,9 +64,8 @@ GROUPS = {NOTHING: (), "stops": tuple(STOPS), "bounds": tuple(BOUNDS)}
 def lifted(limits: SafetyLimits, names: str) -> SafetyLimits:
     """Return `limits` without those of `names`, e.g. `stops+slew`. Raises ConfigError: there is no such limit."""
     single = STOPS | BOUNDS
+    check_known("limit", (*GROUPS, *single), *names.split("+"))
     for name in names.split("+"):
-        if name not in GROUPS and name not in single:
-            raise unknown_name("limit", name, (*GROUPS, *single))
         for each in GROUPS.get(name, (name,)):
             limits = single[each](limits)
     return limits

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Literal, TypeVar
 
-from golem.errors import ConfigError, ModuleFault, unknown_name
+from golem.errors import ConfigError, ModuleFault, check_known
 from golem.evaluation.base import Rung, TrialOutcome, TrialSpec
 from golem.evaluation.episodes.episode import Episode, Loss
 from golem.evaluation.episodes.plain_episode import PlainEpisode
@@ -159,9 +159,7 @@ class PushedRung(LegRung[O]):
 
     def __init__(self, options: O | None = None) -> None:
         super().__init__(options)
-        for name in self.options.direction:
-            if name not in DIRECTIONS:
-                raise unknown_name("direction", name, DIRECTIONS)
+        check_known("direction", DIRECTIONS, *self.options.direction)
         for word in self.options.walk:
             walk_twist(word)
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from golem.capabilities.legs.base import Envelope
-from golem.errors import unknown_name
+from golem.errors import check_known
 from golem.evaluation.base import TrialOutcome, TrialSpec
 from golem.evaluation.episodes.episode import Episode, Loss
 from golem.evaluation.episodes.oracle import errors
@@ -65,9 +65,7 @@ class WalkRough(LegRung[WalkRoughOptions]):
 
     def __init__(self, options: WalkRoughOptions | None = None) -> None:
         super().__init__(options)
-        for ground in self.options.ground:
-            if ground not in GROUNDS:
-                raise unknown_name("ground", ground, GROUNDS)
+        check_known("ground", GROUNDS, *self.options.ground)
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
         grounds = self.options.ground

@@ -15,7 +15,7 @@ from rich.table import Table
 
 from golem import registry
 from golem.capabilities.perception.base import Localizer
-from golem.errors import ConfigError, unknown_name
+from golem.errors import ConfigError, check_known
 from golem.evaluation.conformance.examine import choice_of
 from golem.evaluation.metrics.coco import LabelScore, score_label
 from golem.evaluation.metrics.yolo_labels import read_labelled
@@ -48,9 +48,7 @@ def run_localizer_bench(config: LocalizerBenchConfig) -> dict[str, LabelScore]:
         raise ConfigError(f"--overlap is a share above 0 and up to 1, not {config.overlap:g}.")
     images = read_labelled(config.folder)
     labelled = sorted({image.labels[k] for image in images for k in np.flatnonzero(image.counted)})
-    for label in config.labels:
-        if label not in labelled:
-            raise unknown_name("label", label, labelled)
+    check_known("label", labelled, *config.labels)
     labels = config.labels or tuple(labelled)
     use, options = choice_of(config.use)
     localizer: Localizer = registry.create("localizer", use, options)

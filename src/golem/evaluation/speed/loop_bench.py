@@ -21,7 +21,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from golem.errors import ConfigError, GolemError, unknown_name
+from golem.errors import ConfigError, GolemError, check_known
 from golem.evaluation.speed import loop_measure
 from golem.evaluation.speed.loop_measure import CASES
 
@@ -58,9 +58,7 @@ def run_loop_bench(config: LoopBenchConfig) -> dict[str, Any]:
         ConfigError: a number or a name is wrong, or there is no such checkout.
         GolemError: a trial could not be measured.
     """
-    for name in config.stack:
-        if name not in CASES:
-            raise unknown_name("stack", name, CASES)
+    check_known("stack", CASES, *config.stack)
     if config.seconds < loop_measure.SPAN or config.repetitions < 1 or config.seed < 0:
         raise ConfigError("--seconds must be 0.1 or more, --repetitions 1 or more, --seed 0 or more.")
     trees = {HERE: Path(loop_measure.__file__).parents[3]}

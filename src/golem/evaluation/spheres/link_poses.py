@@ -14,7 +14,7 @@ import coal
 import numpy as np
 from numpy.typing import NDArray
 
-from golem.errors import unknown_name
+from golem.errors import check_known
 from golem.robots.model.link_geometry import LinkGeometry, joint_names, joint_pose, joint_value
 from golem.types import Array
 
@@ -89,9 +89,7 @@ def link_poses(links: Sequence[LinkGeometry], q: Array) -> Array:
 def hold_joints(links: Sequence[LinkGeometry], held: Mapping[str, float]) -> tuple[LinkGeometry, ...]:
     """Return the links with some joints, and their followers, fixed [rad or m]. Raises ConfigError: there is none."""
     names = joint_names(links)
-    for name in held:
-        if name not in names:
-            raise unknown_name("joint", name, names)
+    check_known("joint", names, *held)
     return tuple(
         replace(link, kind="fixed", joint="", leader="", T_parent_link=joint_pose(link, joint_value(link, held)))
         if (link.leader or link.joint) in held and link.kind != "fixed"

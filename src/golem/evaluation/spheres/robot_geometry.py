@@ -12,7 +12,7 @@ from typing import Literal
 import mujoco
 import numpy as np
 
-from golem.errors import ConfigError, unknown_name
+from golem.errors import ConfigError, check_known
 from golem.robots.model import mjcf
 from golem.robots.model.link_geometry import JointKind, LinkGeometry, SurfacePart, joint_pose
 from golem.robots.mujoco.geom_mesh import geom_mesh, pose_matrix
@@ -52,8 +52,7 @@ def read_geometry(
     """
     from golem.evaluation.spheres.urdf_geometry import read_urdf
 
-    if choice not in GEOMETRY_CHOICES:
-        raise unknown_name("choice of surfaces", choice, GEOMETRY_CHOICES)
+    check_known("choice of surfaces", GEOMETRY_CHOICES, choice)
     try:
         text = file.read_bytes()
         try:

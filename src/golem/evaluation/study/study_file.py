@@ -10,7 +10,7 @@ from typing import Any, Literal, cast
 
 import yaml
 
-from golem.errors import ConfigError, unknown_name
+from golem.errors import ConfigError, check_known
 from golem.evaluation.base import rung_class
 from golem.evaluation.harness.ladder import LadderConfig
 from golem.options import fill, read_yaml
@@ -168,8 +168,6 @@ def _check_names(study: StudyFile, names: Sequence[str]) -> None:
             raise ConfigError(f"Two cells are called '{name}'; give one of them a `name`.")
         if not name or any(not (c.isalnum() or c in "-_.") for c in name) or name.startswith("."):
             raise ConfigError(f"'{name}' names a folder: letters, digits, '-', '_' and '.' only.")
-    for name in itertools.chain(*study.compare):
-        if name not in names:
-            raise unknown_name("cell", name, names)
+    check_known("cell", names, *itertools.chain(*study.compare))
     if not names:
         raise ConfigError("A study needs at least one cell.")
