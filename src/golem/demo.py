@@ -278,14 +278,8 @@ def _goal(config: DemoConfig) -> PickGoal:
 
 def _filmed(config: DemoConfig, demo: Demo, running: LockstepRunner, robot: MujocoRobot) -> bool:
     """Demonstrate into a film, as fast as the machine can."""
-    narrator = Narrator(running)
     with closing(Film(robot, fps=FPS, recorder=demo.recorder if running.stack.on_ground else None)) as film:
-
-        def watch() -> None:
-            narrator()
-            demo.tick()
-            film.tick(running)
-
+        watch = Narrator(running, demo.tick, lambda: film.tick(running))
         while not demo.over():
             film.headline = f"{len(demo.in_tray())} of {config.screws} screws in the tray"
             demo.pick(lambda: running.execute("pick", _goal(config), watch=watch))
@@ -302,12 +296,7 @@ def _shown(config: DemoConfig, demo: Demo, running: LockstepRunner, view: LiveVi
     """Demonstrate in real time in the browser; afterwards the operator may go on until Ctrl-C."""
     print(f"Watch it at {view.url} (it should open by itself).", flush=True)
     webbrowser.open(view.url)
-    narrator = Narrator(running)
-
-    def watch() -> None:
-        narrator()
-        demo.tick()
-
+    watch = Narrator(running, demo.tick)
     view.await_spectator()
     while not demo.over():
         demo.pick(lambda: view.run("pick", _goal(config), watch=watch))

@@ -55,23 +55,13 @@ def run_walk_demo(config: DemoConfig) -> bool:
             f"(profile {config.profile}, seed {seed}).",
             flush=True,
         )
-        narrator, recorder, contacts = Narrator(running), BalanceRecorder(robot), ContactWatch(robot)
+        recorder, contacts = BalanceRecorder(robot), ContactWatch(robot)
         with on_air(running, robot, config.record) as show:
-            films: list[Path] = []
-
-            def watch() -> None:
-                narrator()
-                show()
-                recorder(running.executor.t)
-
+            films, looks = list[Path](), (show, lambda: recorder(running.executor.t))
             if config.headless:
                 with closing(Film(robot, fps=FPS, recorder=recorder)) as film:
-
-                    def filmed() -> None:
-                        watch()
-                        film.tick(running)
-
-                    figures = _errand(running, robot, contacts, running.execute, filmed)
+                    watch = Narrator(running, *looks, lambda: film.tick(running))
+                    figures = _errand(running, robot, contacts, running.execute, watch)
                     film.frame(running)
                     print(f"Writing the film ({len(film)} pictures).", flush=True)
                     films = film.save(config.out / "walk.webp")
@@ -79,7 +69,7 @@ def run_walk_demo(config: DemoConfig) -> bool:
                 with LiveView(running, robot, config.port) as view:
                     print(f"Watch it at {view.url}.", flush=True)
                     view.await_spectator()
-                    figures = _errand(running, robot, contacts, view.run, watch)
+                    figures = _errand(running, robot, contacts, view.run, Narrator(running, *looks))
         for path in films:
             print(f"Film:   {path}")
     facts = {"stack": name, "profile": config.profile, "seed": seed}

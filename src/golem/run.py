@@ -125,15 +125,9 @@ def run_stack(config: RunConfig, goal_words: Sequence[str] = ()) -> SkillResult:
     prog = f"golem run {config.stack} --skill {name}"
     goal = skills.goal(name, parse_goal(skills.spec(name), list(goal_words), prog, OPTIONS))
     running, robot = build(stack, config.seed)
-    narrator = Narrator(running)
     with ExitStack() as closing:
         closing.callback(robot.close)
-        show = closing.enter_context(on_air(running, robot, config.record, config.foxglove))
-
-        def watch() -> None:
-            narrator()
-            show()
-
+        watch = Narrator(running, closing.enter_context(on_air(running, robot, config.record, config.foxglove)))
         if config.view or (config.port, config.host) != (RunConfig.port, RunConfig.host):
             view = closing.enter_context(LiveView(running, shown(running, robot), config.port, config.host))
             print(f"Live view: {view.url}   (Ctrl-C ends it)")
@@ -225,8 +219,9 @@ def shown(running: LockstepRunner, robot: object) -> MujocoRobot:
 class Narrator:
     """Prints what the running skill says: each new stage, and each sentence that differs in more than its figures."""
 
-    def __init__(self, running: LockstepRunner) -> None:
-        self._news = News(running.bus, topics.FEEDBACK)
+    def __init__(self, running: LockstepRunner, *others: Callable[[], None]) -> None:
+        """Narrate what `running` does; `others` are called after it each time, in their order."""
+        self._news, self._others = News(running.bus, topics.FEEDBACK), others
         self._said = ""
 
     def __call__(self) -> None:
@@ -235,3 +230,5 @@ class Narrator:
         if feedback is not None and (said != self._said or feedback.data.get("failed")):
             self._said = said
             print(f"{feedback.t:7.2f} s  {feedback.stage:9s} {feedback.text}", flush=True)
+        for look in self._others:
+            look()
