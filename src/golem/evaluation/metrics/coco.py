@@ -106,14 +106,23 @@ def score_label(
             if asked.any() or not fits.any():
                 hits.append((detection.score, bool(asked.any())))
     hits.sort(key=lambda one: -one[0])
-    right = np.cumsum([hit for _, hit in hits]) if hits else np.zeros(0)
-    precision = right / np.arange(1, len(right) + 1)
-    recall = right / max(count, 1)
-    # The curve never falls towards lower recall (all-point interpolation, PASCAL VOC 2010).
-    precision = np.maximum.accumulate(precision[::-1])[::-1]
-    ap = float(np.sum(np.diff(np.concatenate([[0.0], recall])) * precision)) if len(right) else 0.0
+    ap = average_precision([hit for _, hit in hits], count)
     wrong = sum(not hit for _, hit in hits) / max(len(images), 1)
     return LabelScore(count, ap, float(np.median(off)) if off else float("nan"), wrong)
+
+
+def average_precision(hits: Sequence[bool], count: int) -> float:
+    """Return the area under the precision-recall curve, all points of it.
+
+    Args:
+        hits: whether each detection is right, best score first.
+        count: of what there is to be found.
+    """
+    right = np.array(hits, bool)
+    precision = np.cumsum(right) / np.arange(1, len(right) + 1)
+    # The curve never falls towards lower recall (all-point interpolation, PASCAL VOC 2010).
+    precision = np.maximum.accumulate(precision[::-1])[::-1]
+    return float(precision[right].sum() / max(count, 1))
 
 
 def _shares(box: Array, boxes: Array, crowd: NDArray[np.bool_]) -> Array:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from golem.evaluation.metrics.coco import average_precision
 from golem.figures import blank_figure
 from golem.training.detector.dataset import CONDITIONS, Labelled
 from golem.training.detector.labels import CLASSES
@@ -21,16 +21,14 @@ SIZE = (1000, 420)
 
 def draw_curve(curve: Path, out: Path) -> None:
     """Draw average precision over crops seen, per class and camera. Raises MissingExtra: without matplotlib."""
-    with curve.open() as file:
-        rows = list(csv.DictReader(file))
-    seen = [int(row["images"]) / 1000 for row in rows]
-    columns = [name.split("_", 2)[1:] for name in rows[0] if name.startswith("ap_")]
+    rows = np.genfromtxt(curve, delimiter=",", names=True, deletechars="")
+    columns = [name.split("_", 2)[1:] for name in rows.dtype.names or () if name.startswith("ap_")]
     cameras = list(dict.fromkeys(camera for camera, _ in columns))
     figure = blank_figure(*SIZE)
     panels = figure.subplots(1, len(cameras), sharey=True, squeeze=False)[0]
     for camera, axes in zip(cameras, panels, strict=True):
         for label in (label for one, label in columns if one == camera):
-            axes.plot(seen, [float(row[f"ap_{camera}_{label}"]) for row in rows], ".-", label=label)
+            axes.plot(rows["images"] / 1000, rows[f"ap_{camera}_{label}"], ".-", label=label)
         axes.set(ylim=(0.0, 1.0), xlabel="training crops [thousands]", title=camera)
         axes.grid(color="#dddddd")
     panels[0].set(ylabel="AP on images that are set apart")
@@ -123,16 +121,11 @@ def _lies_on(center: Array, labels: Array) -> bool:
 
 def _score(hits: list[tuple[float, bool, float]], count: int) -> Score:
     hits = sorted(hits, reverse=True)
-    good = np.cumsum([h[1] for h in hits]) if hits else np.zeros(0)
-    precision = good / np.arange(1, len(hits) + 1)
-    envelope = np.maximum.accumulate(precision[::-1])[::-1]
-    steps = np.array([h[1] for h in hits], bool)
-    ap = float(envelope[steps].sum() / max(count, 1)) if hits else 0.0
     working = [h for h in hits if h[0] >= WORKING]
     right = [h[2] for h in working if h[1]]
     return Score(
         count=count,
-        ap=ap,
+        ap=average_precision([h[1] for h in hits], count),
         recall=len(right) / max(count, 1),
         precision=len(right) / max(len(working), 1),
         error=float(np.median(right)) if right else float("nan"),
