@@ -15,7 +15,7 @@ from golem.capabilities.policies.onnx_policy import MEASURED, POSITIONS, OnnxPol
 from golem.capabilities.policies.vectors import STATE, check_actions  # noqa: E402
 from golem.datasets.schema import DatasetError  # noqa: E402
 from golem.errors import ConfigError  # noqa: E402
-from golem.training.act.__main__ import train_act  # noqa: E402
+from golem.training.act.train_act import train_act  # noqa: E402
 
 
 @pytest.mark.slow

@@ -13,7 +13,7 @@ torch = pytest.importorskip("torch", reason="training needs the extra 'train'")
 
 from golem.capabilities.perception.onnx_detector import OnnxDetector, OnnxDetectorConfig  # noqa: E402
 from golem.errors import ConfigError  # noqa: E402
-from golem.training.detector.__main__ import load_own, main  # noqa: E402
+from golem.training.detector.detector_commands import load_own, main  # noqa: E402
 
 
 def picture(rng: np.random.Generator, place: tuple[int, int]) -> np.ndarray:

@@ -10,9 +10,9 @@ import pytest
 
 from golem.capabilities.grasping.hand_view import FACTS, SEEN
 from golem.errors import ConfigError
-from golem.training.grasps import __main__
-from golem.training.grasps.__main__ import TrainScorerConfig, auc, first_held, table, train, train_grasps
+from golem.training.grasps import train_scorer
 from golem.training.grasps.grasp_labels import GraspLabels
+from golem.training.grasps.train_scorer import TrainScorerConfig, auc, first_held, table, train, train_grasps
 
 
 def made_up(seed: int, n: int = 600) -> GraspLabels:
@@ -31,15 +31,15 @@ def test_area_under_the_curve_counts_ordered_pairs() -> None:
 
 def test_slopes_are_those_of_the_loss() -> None:
     rng = np.random.default_rng(0)
-    values: __main__.Pass = [rng.standard_normal(s).astype(np.float64) for s in ((6, 5), (5, 1), (5,), (1,))]
+    values: train_scorer.Pass = [rng.standard_normal(s).astype(np.float64) for s in ((6, 5), (5, 1), (5,), (1,))]
     x, held = rng.standard_normal((7, 6)), rng.random(7) < 0.5
-    _, slopes = __main__._slopes(values, x, held, 0.0, rng)
+    _, slopes = train_scorer._slopes(values, x, held, 0.0, rng)
     for value, slope in zip(values, slopes, strict=True):
         spot = np.unravel_index(int(np.abs(slope).argmax()), value.shape)
         losses = []
         for step in (1e-5, -2e-5):
             value[spot] += step
-            losses.append(__main__._slopes(values, x, held, 0.0, rng)[0])
+            losses.append(train_scorer._slopes(values, x, held, 0.0, rng)[0])
         value[spot] += 1e-5
         assert slope[spot] == pytest.approx((losses[0] - losses[1]) / 2e-5, rel=1e-3)
 

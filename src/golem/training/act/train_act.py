@@ -9,7 +9,6 @@ says (a conditional VAE, their eq. 1-2); in use it is zero, the mean of its prio
 from __future__ import annotations
 
 import json
-import sys
 import time
 import warnings
 from pathlib import Path
@@ -206,7 +205,3 @@ def _save(net: ActNetwork, out: Path, camera: str, size: tuple[int, int], fps: i
 def main(words: list[str]) -> None:
     """Run the command `golem train act` with the `words` that follow it."""
     tyro.cli(train_act, prog="golem train act", args=words)
-
-
-if __name__ == "__main__":
-    main(sys.argv[1:])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from importlib import resources
 from pathlib import Path
@@ -216,9 +215,8 @@ def own(
     print(f"localizer: {{use: onnx, weights: {path}}}")
 
 
-def main(words: list[str] | None = None) -> None:
-    """Run one of the commands, or `own` where the first word is an option of it; `words` are by default the line's."""
-    words = sys.argv[1:] if words is None else words
+def main(words: list[str]) -> None:
+    """Run one of the commands, or `own` where the first word is an option of it."""
     if words and words[0].startswith("--") and words[0] != "--help":
         tyro.cli(own, prog="golem train detector", args=words)
         return
@@ -228,7 +226,3 @@ def main(words: list[str] | None = None) -> None:
         description="Or: golem train detector --labels FOLDER, on your own images; --labels --help lists its options.",
         args=words,
     )
-
-
-if __name__ == "__main__":
-    main()

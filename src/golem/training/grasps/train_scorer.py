@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -33,12 +32,10 @@ LINES = {
 def draw_curve(curve: Path, out: Path) -> None:
     """Draw the area under the ROC curve over epochs. Raises MissingExtra: matplotlib is not installed."""
     figure = blank_figure(*SIZE)
-    with curve.open() as file:
-        rows = list(csv.DictReader(file))
-    epochs = [int(row["epoch"]) for row in rows]
+    rows = np.genfromtxt(curve, delimiter=",", names=True)
     axes = figure.subplots()
     for column, (name, colour, dashes) in LINES.items():
-        axes.plot(epochs, [float(row[column]) for row in rows], dashes, color=colour, label=name)
+        axes.plot(rows["epoch"], rows[column], dashes, color=colour, label=name)
     axes.set(ylim=(0.5, 1.0), xlabel="epoch", ylabel="AUC")
     axes.set_title("Held or not: area under the ROC curve", fontsize=10, loc="left")
     axes.grid(color="#dddddd")
@@ -223,10 +220,6 @@ def table(held: GraspLabels, scores: NDArray[np.floating]) -> str:
     return "\n".join(lines)
 
 
-def main(words: list[str] | None = None) -> None:
-    """Train; `words` are the command line's by default."""
-    tyro.cli(train_grasps, prog="golem train grasps", args=sys.argv[1:] if words is None else words)
-
-
-if __name__ == "__main__":
-    main()
+def main(words: list[str]) -> None:
+    """Run the command `golem train grasps` with the `words` that follow it."""
+    tyro.cli(train_grasps, prog="golem train grasps", args=words)

@@ -93,12 +93,8 @@ def shove(
     Console().print(table)
 
 
-def main(args: list[str] | None = None) -> None:
-    """Run the command line."""
+def main(words: list[str]) -> None:
+    """Run one of the commands."""
     commands = {"run": run, "export": export, "average": average, "curve": curve, "shove": shove}
     says = "Train the leg policy."
-    tyro.extras.subcommand_cli_from_dict(commands, prog="golem train legs", args=args, description=says)
-
-
-if __name__ == "__main__":
-    main()
+    tyro.extras.subcommand_cli_from_dict(commands, prog="golem train legs", args=words, description=says)
