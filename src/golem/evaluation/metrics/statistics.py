@@ -133,13 +133,10 @@ def difference(a: float, of_a: Interval, b: float, of_b: Interval, r: float) -> 
 
 def holm(p_values: Sequence[float]) -> list[float]:
     """Return p-values adjusted for their number by the step-down method of Holm (1979), in the same order."""
-    order = sorted(range(len(p_values)), key=lambda i: p_values[i])
-    adjusted = [0.0] * len(p_values)
-    floor = 0.0
-    for rank, i in enumerate(order):
-        floor = max(floor, min(1.0, (len(p_values) - rank) * p_values[i]))
-        adjusted[i] = floor
-    return adjusted
+    p, adjusted = np.array(p_values, dtype=np.float64), np.empty(len(p_values))
+    order = np.argsort(p, kind="stable")
+    adjusted[order] = np.maximum.accumulate(np.minimum(np.arange(len(p), 0, -1) * p[order], 1.0))
+    return adjusted.tolist()
 
 
 def distribution(values: Sequence[float], low: float = -math.inf, high: float = math.inf) -> Distribution | None:
