@@ -295,19 +295,22 @@ def _skills(name: str, value: object) -> dict[str, Choice]:
 
 
 def _choice(name: str, key: str, slot: str, value: object) -> Choice:
-    if isinstance(value, str):
-        return Choice(*_resolved(slot, value, {}))
-    if not isinstance(value, Mapping) or not isinstance(value.get("use"), str):
+    use, options = value, dict[str, Any]()
+    if isinstance(value, Mapping):
+        use, options = value.get("use"), {key: v for key, v in value.items() if key != "use"}
+    if not isinstance(use, str):
         raise ConfigError(
             f"{name}: '{key}' wants '{{use: NAME, option: value, ...}}', with NAME one of "
             f"{', '.join(registry.names(slot))}, package.module:Class or file.py:Class."
         )
-    options = {key: v for key, v in value.items() if key != "use"}
     check_values(f"{name}: {key}", options)
-    return Choice(*_resolved(slot, value["use"], options))
+    use, own = registry.resolve(slot, use, options)
+    return Choice(use, dict(own))
 
 
-def _resolved(slot: str, use: str, options: dict[str, Any]) -> tuple[str, dict[str, Any]]:
-    """Return `registry.resolve` of what a stack file says."""
-    name, own = registry.resolve(slot, use, options)
-    return name, dict(own)
+def read_choice(slot: str, use: str) -> Choice:
+    """Return what `use` chooses for `slot`: a name, or `{use: NAME, option: value, ...}`.
+
+    Raises ConfigError: it begins with `{` and is not of that form.
+    """
+    return _choice(f"'{use}'", slot, slot, read_yaml(use, f"'{use}'") if use.startswith("{") else use)

@@ -98,7 +98,7 @@ def test_json_is_all_that_is_printed(
         (["grasp"], "Unknown slot 'grasp'"),
         (["grasp_method", "centriod"], "Did you mean 'centroid'?"),
         (["grasp_method", "nowhere.py:Mine"], "does not exist"),
-        (["grasp_method", "{depth: 1}"], "is not of the form"),
+        (["grasp_method", "{depth: 1}"], "wants '{use: NAME, option: value, ...}'"),
     ],
 )
 def test_what_cannot_be_checked_ends_in_2(

@@ -9,15 +9,14 @@ from contextlib import contextmanager
 from importlib import import_module
 from time import thread_time as cpu_now
 from types import FrameType
-from typing import cast
 
 from golem import registry
-from golem.errors import ConfigError, MissingExtra, MissingSystemLibrary, ModuleFault, check_known
+from golem.errors import MissingExtra, MissingSystemLibrary, ModuleFault, check_known
 from golem.evaluation.conformance import base
 from golem.evaluation.conformance.suite import Suite
 from golem.evaluation.no_search import searching_forbidden
-from golem.options import check_values, read_yaml
 from golem.package_data import load_data
+from golem.stack import read_choice
 from golem.traces import caller
 
 LIMIT = 120.0
@@ -88,26 +87,11 @@ def candidate(slot: str, use: str) -> base.Candidate:
         ModuleFault: importing the file raised.
     """
     suite = suite_of(slot)
-    name, options = choice_of(use)
-    options = options or OPTIONS.get(slot, {}).get(name, {})
+    choice = read_choice(slot, use)
+    name = choice.use if use.startswith("{") else use
+    options = choice.options or OPTIONS.get(slot, {}).get(name, {})
     registry.load(slot, name)
     return base.Candidate(slot, name, lambda: registry.create(slot, name, options, **suite.context()))
-
-
-def choice_of(use: str) -> tuple[str, Mapping[str, object]]:
-    """Return name and options of a module as it is given on the command line.
-
-    Raises ConfigError: it begins with `{` and is not of the form `{use: NAME, option: value, ...}`.
-    """
-    if not use.startswith("{"):
-        return use, {}
-    value = read_yaml(use, f"'{use}'")
-    if not isinstance(value, Mapping) or not isinstance(value.get("use"), str):
-        raise ConfigError(f"'{use}' is not of the form '{{use: NAME, option: value, ...}}'.")
-    chosen = cast("Mapping[str, object]", value)
-    options = {key: v for key, v in chosen.items() if key != "use"}
-    check_values(use, options)
-    return str(chosen["use"]), options
 
 
 def examine(subject: base.Candidate, on_check: Callable[[base.Check], None] = lambda check: None) -> base.Report:

@@ -6,10 +6,12 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+from golem import registry
 from golem.errors import ConfigError
 from golem.evaluation.base import Case
 from golem.options import check_values, read_yaml
 from golem.robots.worlds.conditions import CHOICES, NAMES, Value, check_condition
+from golem.stack import read_choice
 
 COUNT = 5
 """Values of a range that names no count."""
@@ -72,6 +74,12 @@ def replaced_modules(words: Iterable[str]) -> dict[str, str]:
             raise ConfigError(f"--use names the {slot} twice.")
         replaced[slot] = implementation
     return replaced
+
+
+def new_module(slot: str, use: str) -> Any:
+    """Return a new module of `slot`, see `read_choice`; raises as `registry.create` does, too."""
+    choice = read_choice(slot, use)
+    return registry.create(slot, choice.use, choice.options)
 
 
 def robot_options(words: Iterable[str]) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from golem.capabilities.odometry.base import LidarOdometry, OdometryEstimate
 from golem.evaluation.base import DONE, Key, Rung, TrialOutcome, TrialSpec
 from golem.evaluation.episodes import lidar_walk
 from golem.evaluation.episodes.episode import legs_stack
+from golem.evaluation.harness.arguments import new_module
 from golem.interfaces import lidar_convert, public
 from golem.interfaces.lidar import ExternalOdometry, LegOdometry, LidarImu, LidarScan
 from golem.middleware.bags.base import BagMessage
@@ -24,7 +25,6 @@ from golem.middleware.bags.recorder import topic
 from golem.middleware.ros import codec
 from golem.provenance import stack_facts
 from golem.runtime.contract_check import ContractCheck
-from golem.stack import Choice, Stack
 from golem.types import Array
 
 TRUTH = "/truth/odom"
@@ -153,7 +153,7 @@ class OdometryRung(Rung[OdometryOptions]):
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
         walking = legs_stack(self.options.legs, profile, overrides)
-        _make(_choice(method))
+        new_module(SLOT, method)
         facts = stack_facts(walking.with_choice(SLOT, method))
         return {**facts, "cases": {name: _plain(CONDITIONS[name]) for name in self.options.case}}
 
@@ -220,7 +220,7 @@ def kept(heard: Iterator[Reading], walk: lidar_walk.LidarWalk, folder: Path) -> 
 def follow(walk: lidar_walk.LidarWalk, heard: Iterator[Reading], methods: Sequence[str]) -> dict[str, Followed]:
     """Let new odometries follow a walk by what was `heard`, all at once; return what became of each."""
     contracts = {method: ContractCheck(SLOT, method) for method in methods}
-    modules: dict[str, LidarOdometry] = {method: _make(_choice(method)) for method in methods}
+    modules: dict[str, LidarOdometry] = {method: new_module(SLOT, method) for method in methods}
     found = {method: Followed([], []) for method in methods}
     spent = dict.fromkeys(methods, 0.0)
     for reading in heard:
@@ -290,11 +290,3 @@ def _condition(spec: TrialSpec) -> Condition:
 def _plain(condition: Condition) -> dict[str, Any]:
     """Return a condition as JSON has it, which knows no infinity."""
     return {k: str(v) if v in (np.inf, (np.inf, np.inf)) else v for k, v in asdict(condition).items()}
-
-
-def _choice(method: str) -> Choice:
-    return Stack().with_choice(SLOT, method).choice(SLOT)
-
-
-def _make(choice: Choice) -> Any:
-    return registry.create(SLOT, choice.use, choice.options)

@@ -10,10 +10,10 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from golem import registry
 from golem.capabilities.memory.base import Memory, Observation, Place, When
 from golem.evaluation.base import DONE, Outcomes, Rung, TrialOutcome, TrialSpec
 from golem.evaluation.episodes.relocation import Rates, Relocation, Setting, Thing, relocation
+from golem.evaluation.harness.arguments import new_module
 from golem.evaluation.metrics.statistics import mean_interval
 from golem.evaluation.metrics.text_table import TextTable
 from golem.evaluation.report.svg_figure import COLOUR
@@ -220,7 +220,7 @@ class MemoryRung(Rung[Any]):
         episodes: dict[str, tuple[list[ObjectTimeline], int]] = {}
         for condition, spec in chosen.items():
             episode = relocation(spec.rng("memory"), CONDITIONS[condition])
-            memory = _make(method)
+            memory: Memory = new_module(SLOT, method)
             rows = timeline(memory, episode)
             memory.close()
             episodes[f"trial {spec.index}, {condition}"] = rows, episode.split
@@ -232,11 +232,6 @@ def _share(values: Sequence[float]) -> str:
     interval = mean_interval(values, 0.0, 1.0)
     bounds = "" if interval is None else f" {interval.text(100.0)}"
     return f"{100 * float(np.mean(values)):.1f}{bounds}"
-
-
-def _make(method: str) -> Memory:
-    choice = Stack().with_choice(SLOT, method).choice(SLOT)
-    return registry.create(SLOT, choice.use, choice.options)
 
 
 def ask(method: str, episode: Relocation) -> TrialOutcome:
@@ -278,7 +273,8 @@ class _Watched:
     """A new memory whose contract is watched, and the CPU time [s] of each look and each query."""
 
     def __init__(self, method: str) -> None:
-        self.memory, self._contract = _make(method), ContractCheck(SLOT, method)
+        self.memory: Memory = new_module(SLOT, method)
+        self._contract = ContractCheck(SLOT, method)
         self.updates, self.queries = list[float](), list[float]()
 
     def observe(self, look: Observation) -> None:

@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
-from golem import registry
 from golem.capabilities.perception.base import Localizer
 from golem.errors import ConfigError, check_known
-from golem.evaluation.conformance.examine import choice_of
+from golem.evaluation.harness.arguments import new_module
 from golem.evaluation.metrics.coco import LabelScore, score_label
 from golem.evaluation.metrics.yolo_labels import read_labelled
 from golem.evaluation.speed.bench import timed
@@ -50,8 +49,7 @@ def run_localizer_bench(config: LocalizerBenchConfig) -> dict[str, LabelScore]:
     labelled = sorted({image.labels[k] for image in images for k in np.flatnonzero(image.counted)})
     check_known("label", labelled, *config.labels)
     labels = config.labels or tuple(labelled)
-    use, options = choice_of(config.use)
-    localizer: Localizer = registry.create("localizer", use, options)
+    localizer: Localizer = new_module("localizer", config.use)
     pictures = [image.read() for image in images]
     found: dict[int, list[Detection]] = {}
 
