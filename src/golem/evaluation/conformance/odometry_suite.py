@@ -13,7 +13,7 @@ from golem.capabilities.odometry.base import SOURCES, LidarOdometry, OdometryEst
 from golem.evaluation.conformance.base import Candidate, check
 from golem.evaluation.conformance.room import ROOM, MadeWalk, Reading
 from golem.evaluation.conformance.samples import with_nan
-from golem.evaluation.conformance.suite import Suite
+from golem.evaluation.conformance.suite import Suite, check_fields
 from golem.interfaces.lidar import ExternalOdometry, LegOdometry, LidarImu, LidarScan
 from golem.runtime.contract_check import ContractCheck
 
@@ -109,8 +109,7 @@ class OdometrySuite(Suite):
             T = contract.array(name, getattr(answer, name), 4, 4)
             if np.abs(T[:3, :3] @ T[:3, :3].T - np.eye(3)).max() > 1e-3:
                 raise contract.fault(f"{name} is not a rigid transform")
-        for name in ("velocity", "rate"):
-            contract.array(name, getattr(answer, name), 3)
+        check_fields(contract, answer, velocity=(3,), rate=(3,))
         P = answer.covariance
         if not isinstance(P, np.ndarray) or P.shape != (6, 6):
             raise contract.fault("covariance is no array of shape (6, 6)")

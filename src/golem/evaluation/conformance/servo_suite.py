@@ -9,7 +9,7 @@ import numpy as np
 
 from golem.evaluation.conformance import samples
 from golem.evaluation.conformance.base import Candidate, check
-from golem.evaluation.conformance.suite import Suite
+from golem.evaluation.conformance.suite import Suite, check_fields
 from golem.hardware.servo.base import MotorServo
 from golem.runtime.contract_check import ContractCheck
 from golem.types import LEGS, NUM_JOINTS, TICK, Array, LowCommand, LowState
@@ -61,9 +61,8 @@ class ServoSuite(Suite):
 
     def judge(self, contract: ContractCheck, answer: Any) -> None:
         contract.kind("the motor command", answer, LowCommand)
-        contract.number("t", answer.t)
-        for name in ("q", "dq", "tau", "kp", "kd"):
-            contract.array(name, getattr(answer, name), NUM_JOINTS)
+        n = (NUM_JOINTS,)
+        check_fields(contract, answer, t=(), q=n, dq=n, tau=n, kp=n, kd=n)
 
     @check
     def gains_are_not_negative(self, candidate: Candidate) -> None:

@@ -114,10 +114,6 @@ class SkillSuite(Suite):
         if answer.result is not None and not answer.result.reason.strip():
             raise candidate.fault("its result gives no reason")
 
-    def edges(self) -> Mapping[str, Sequence[None]]:
-        """Return nothing: what a goal may be is the skill's own to say."""
-        return {}
-
 
 def goal_for(module: Any) -> Any:
     """Return a goal: defaults where there are any, else simple values. Raises Inapplicable: the skill refuses it."""

@@ -8,7 +8,7 @@ import math
 import statistics
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, cast
 
 import numpy as np
@@ -133,12 +133,17 @@ class Suite:
         """Check kinds, shapes and finiteness of one answer; raises `ModuleFault`."""
         raise NotImplementedError
 
-    def run(self, candidate: Candidate, inputs: Sequence[Any], module: Any = None) -> list[Any]:
-        """Return copies of what a module, by default a new one, says to `inputs` from its start on."""
+    def answers(self, candidate: Candidate, inputs: Sequence[Any], module: Any = None) -> Iterator[Any]:
+        """Yield what a module, by default a new one, says to `inputs` from its start on."""
         contract = candidate.contract
         module = contract.call(candidate.make) if module is None else module
         contract.call(self.begin, module, inputs[0])
-        return [copy.deepcopy(contract.call(self.call, module, given)) for given in inputs]
+        for given in inputs:
+            yield contract.call(self.call, module, given)
+
+    def run(self, candidate: Candidate, inputs: Sequence[Any], module: Any = None) -> list[Any]:
+        """Return copies of the answers, see `answers`."""
+        return [copy.deepcopy(answer) for answer in self.answers(candidate, inputs, module)]
 
     def answers_of(self, candidate: Candidate) -> list[Any]:
         """Return what a new module says to the ordinary inputs."""
@@ -207,12 +212,9 @@ class Suite:
     @check
     def leaves_inputs_alone(self, candidate: Candidate) -> None:
         """It changes nothing in what it is given."""
-        module, contract = candidate.make(), candidate.contract
         inputs = self.inputs()
         before = copy.deepcopy(inputs)
-        contract.call(self.begin, module, inputs[0])
-        for given, unchanged in zip(inputs, before, strict=True):
-            contract.call(self.call, module, given)
+        for given, unchanged, _ in zip(inputs, before, self.answers(candidate, inputs), strict=True):
             found = difference(unchanged, given, "its input")
             if found:
                 raise candidate.fault(f"{found}: it writes into what it is given")
@@ -220,14 +222,7 @@ class Suite:
     @check
     def leaves_answers_alone(self, candidate: Candidate) -> None:
         """It changes nothing in what it has returned: answers travel, and arrive later."""
-        module, contract = candidate.make(), candidate.contract
-        inputs = self.inputs()
-        contract.call(self.begin, module, inputs[0])
-        given: list[tuple[Any, Any]] = []
-        for one in inputs:
-            answer = contract.call(self.call, module, one)
-            given.append((answer, copy.deepcopy(answer)))
-        for answer, unchanged in given:
+        for answer, unchanged in [(one, copy.deepcopy(one)) for one in self.answers(candidate, self.inputs())]:
             found = difference(unchanged, answer)
             if found:
                 raise candidate.fault(f"{found}: it writes into what it has returned")
