@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+import pinocchio as pin
 
 from golem.capabilities.legs.balance_errors import VelocityIntegratorConfig
 from golem.capabilities.legs.gait import GaitConfig
 from golem.capabilities.legs.gait_clock import LOADED, SMOOTHING, STOOD
 from golem.robots.model.imu_mount import sensed_base_rate
 from golem.robots.model.leg_kinematics import SOLE_CENTER
-from golem.robots.model.pinocchio_model import Kinematics
+from golem.robots.model.pinocchio_model import Kinematics, build
 from golem.types import GRAVITY, SIDES, Array, BaseEstimate, LowState, PlanarPose
 
 STILL = PlanarPose(0.0, 0.0, 0.0)
@@ -24,7 +25,8 @@ class ClockTwin:
 
     def __init__(self, gait: GaitConfig, trim: VelocityIntegratorConfig | None) -> None:
         self.gait, self.trim = gait, trim
-        self.kinematics = Kinematics()
+        self.kinematics, self.model = Kinematics(), build()
+        self.data = self.model.createData()
         left, right = self._feet(np.zeros(27))[:, :2, 3]
         self.stance: Array = left - right
         self.phase, self.stepping, self.idle = 0.0, False, 0.0
@@ -42,7 +44,8 @@ class ClockTwin:
     def step(self, state: LowState, base: BaseEstimate, twist: Array, dt: float) -> Array:
         """Advance by `dt` and return the corrected twist."""
         R = base.T_odom_base[:3, :3]
-        feet, com = self._feet(state.q), R @ self.kinematics.com()
+        com: Array = R @ pin.centerOfMass(self.model, self.data, state.q)
+        feet = self._feet(state.q)
         rate = R @ sensed_base_rate(state)
         capture, misplaced = stand_errors(
             R, com, base.velocity + np.cross(rate, com), feet[:, :3, 3] @ R.T, self.stance

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 
-from golem.capabilities.legs.gait_clock import StopPredictor
+from golem.capabilities.legs.gait_clock import StopPredictor, step_rest
 from golem.types import Array, PlanarPose
 
 DT = 0.01
@@ -16,9 +14,8 @@ FEET = (PlanarPose(0.06, 0.16, 0.0), PlanarPose(0.06, -0.16, 0.0))
 """Of a robot that stands, as seen from base_link."""
 
 
-def matrix(pose: PlanarPose, height: float = 0.0) -> Array:
-    c, s = math.cos(pose.yaw), math.sin(pose.yaw)
-    return np.array([[c, -s, 0, pose.x], [s, c, 0, pose.y], [0, 0, 1, height], [0, 0, 0, 1]])
+def numbers(pose: PlanarPose) -> Array:
+    return np.array([pose.x, pose.y, pose.yaw])
 
 
 class Robot:
@@ -38,8 +35,7 @@ class Robot:
             contact = np.array([not left_up, not right_up], dtype=np.float64)
             astray = PlanarPose(0.1, 0.05, 0.2)
             feet = [foot if c else foot @ astray for foot, c in zip(self.feet, contact, strict=True)]
-            seen = np.array([matrix(self.base.to(foot), -0.9) for foot in feet])
-            self.rest.step(matrix(self.base, 0.9), seen, contact, moving, DT)
+            step_rest(self.rest.memory[0], numbers(self.base), np.array([*map(numbers, feet)]), contact, moving, DT)
 
 
 def same(a: PlanarPose, b: PlanarPose, tolerance: float = 1e-3) -> None:

@@ -5,10 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from golem.capabilities.legs.balance_errors import VelocityIntegrator, VelocityIntegratorConfig
+from golem.capabilities.legs.balance_errors import VelocityIntegrator, VelocityIntegratorConfig, step_trim
 from golem.types import Array
 
 DT = 0.01
+
+
+def trimmed(trim: VelocityIntegrator, wanted: Array, R: Array, velocity: Array, turn: float) -> Array:
+    out = np.empty(3)
+    step_trim(trim.memory[0], wanted, R, velocity, turn, DT, out)
+    return out
 
 
 def walk(trim: VelocityIntegrator, wanted: Array, seconds: float, yaw: float = 0.0, push: float = 0.0) -> Array:
@@ -18,7 +24,7 @@ def walk(trim: VelocityIntegrator, wanted: Array, seconds: float, yaw: float = 0
     done = np.zeros(3)
     for k in range(round(seconds / DT)):
         velocity = R @ np.array([done[0] + push * (k < 100), done[1], 0.0])
-        told = trim.step(wanted, R, velocity, np.array([0.0, 0.0, done[2]]), DT)
+        told = trimmed(trim, wanted, R, velocity, float(done[2]))
         done = 0.85 * told + np.array([0.0, -0.02, 0.01])
     return done
 
@@ -34,7 +40,7 @@ def test_a_push_hardly_counts() -> None:
     config = VelocityIntegratorConfig()
     trim = VelocityIntegrator(config)
     walk(trim, np.zeros(3), 1.0, push=1.5)
-    told = trim.step(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3), DT)
+    told = trimmed(trim, np.zeros(3), np.eye(3), np.zeros(3), 0.0)
     assert np.abs(told[0]) <= config.gain * config.heed[0] * 1.0 + 1e-9
 
 
@@ -42,7 +48,7 @@ def test_the_correction_is_bounded_and_forgotten() -> None:
     trim = VelocityIntegrator()
     wanted = np.array([0.5, 0.0, 0.0])
     for _ in range(2000):
-        told = trim.step(wanted, np.eye(3), np.zeros(3), np.zeros(3), DT)
+        told = trimmed(trim, wanted, np.eye(3), np.zeros(3), 0.0)
     np.testing.assert_allclose(told - wanted, [VelocityIntegratorConfig().maximum[0], 0.0, 0.0])
     trim.reset()
-    assert np.abs(trim.step(wanted, np.eye(3), np.zeros(3), np.zeros(3), DT) - wanted).max() < 1e-3
+    assert np.abs(trimmed(trim, wanted, np.eye(3), np.zeros(3), 0.0) - wanted).max() < 1e-3

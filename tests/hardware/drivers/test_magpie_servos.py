@@ -101,7 +101,7 @@ def test_it_opens_and_reports_a_hundred_times_a_second(hand: Hand) -> None:
     assert hand.state is GripState.OPEN
     assert 95 <= sum(report.t > hand.t - 1.0 for report in hand.reports) <= 101
     assert hand.reports[-1].gap == pytest.approx(hand.reports[-1].fingers.sum()) and hand.reports[-1].gap > 0.102
-    assert (hand.driver.lost, hand.driver.strays, hand.driver.skipped, hand.faults) == (0, 0, 0, [])
+    assert (hand.driver.lost, hand.driver.strays, hand.driver.parser.skipped, hand.faults) == (0, 0, 0, [])
 
 
 @pytest.mark.parametrize("gap", [0.005, 0.02, 0.05, 0.09, 0.10])
@@ -164,7 +164,7 @@ def test_lost_and_damaged_answers_are_never_read_as_no_load(hand: Hand) -> None:
     hand.bus.loss = hand.bus.damage = 0.15
     before = len(hand.reports)
     hand.run(20.0)
-    assert len(hand.reports) - before > 500 and hand.driver.skipped > 500
+    assert len(hand.reports) - before > 500 and hand.driver.parser.skipped > 500
     for report in hand.reports[before:]:
         assert np.abs(report.force - 8.0).max() <= 0.04
         assert report.gap == pytest.approx(0.010, abs=3e-4)

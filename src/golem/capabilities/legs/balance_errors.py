@@ -100,7 +100,15 @@ TRIM = np.dtype(
 
 @njit(cache=True, nogil=True)
 def step_trim(m: Record, twist: Array, R: Array, velocity: Array, turn: float, dt: float, out: Array) -> None:
-    """Do what `VelocityIntegrator.step` does with `m`, a `TRIM`; `turn` is the rate about z, `out` (3,) is filled."""
+    """Write into `out` (3,) the twist to command so that `twist` is what comes of it; `m` is a `TRIM`.
+
+    Args:
+        twist: (3,) vx, vy [m/s], wz [rad/s] that is wanted.
+        R: (3, 3) rotation of base_link in a level frame.
+        velocity: (3,) of base_link in that frame [m/s].
+        turn: its angular rate about the vertical [rad/s].
+        dt: time since the previous step [s].
+    """
     c, s = heading(R)
     share = dt / (m.smoothing + dt)
     for a in range(3):
@@ -127,17 +135,3 @@ class VelocityIntegrator:
     def reset(self) -> None:
         """Forget what was learned: the robot stands, or another controller took over."""
         self.memory["surplus"] = self.memory["correction"] = 0.0
-
-    def step(self, twist: Array, R: Array, velocity: Array, rate: Array, dt: float) -> Array:
-        """Return the (3,) twist to command so that `twist` is what comes of it.
-
-        Args:
-            twist: (3,) vx, vy [m/s], wz [rad/s] that is wanted.
-            R: (3, 3) rotation of base_link in a level frame.
-            velocity: (3,) of base_link in that frame [m/s].
-            rate: (3,) angular, in that frame [rad/s].
-            dt: time since the previous step [s].
-        """
-        out = np.empty(3)
-        step_trim(self.memory[0], twist, np.ascontiguousarray(R), velocity, float(rate[2]), dt, out)
-        return out

@@ -79,7 +79,14 @@ def _toward(a: Array, b: Array, share: float, out: Array) -> None:
 
 @njit(cache=True, nogil=True)
 def step_rest(m: Record, here: Array, feet: Array, contact: Array, moving: bool, dt: float) -> None:
-    """Do what `StopPredictor.step` does with `m`, a `REST`; `here` (3,) and `feet` (2, 3) are planar poses in odom."""
+    """Advance `m`, a `REST`, by `dt` [s].
+
+    Args:
+        here: (3,) planar pose of base_link in odom.
+        feet: (2, 3) those of the soles, left and right.
+        contact: (2,) probability that each foot carries load.
+        moving: whether the robot walks or steps.
+    """
     for k in range(2):
         planted = not moving or contact[k] > LOADED
         # The mean over a stance, because a sole rolls and the estimate trembles; at rest the newest is the best.
@@ -118,21 +125,6 @@ class StopPredictor:
     def reset(self) -> None:
         """Forget everything."""
         self.memory[:] = np.zeros((), REST)
-
-    def step(self, base: Array, feet: Array, contact: Array, moving: bool, dt: float) -> None:
-        """Advance by `dt` [s].
-
-        Args:
-            base: (4, 4) pose of base_link in odom.
-            feet: (2, 4, 4) poses of the soles in base_link, left and right.
-            contact: (2,) probability that each foot carries load.
-            moving: whether the robot walks or steps.
-        """
-        here, prints = np.empty(3), np.empty((2, 3))
-        planar(base, here)
-        for pose, foot in zip(prints, base @ feet, strict=True):
-            planar(foot, pose)
-        step_rest(self.memory[0], here, prints, contact, moving, dt)
 
 
 SEEN = np.dtype(

@@ -262,6 +262,7 @@ class MagpieServos:
     """Speaks to the servos of one hand. Never waits: it has to be stepped every 2 ms or so.
 
     Attributes:
+        parser: finds answers among what has come; it counts what was none.
         lost: questions without an answer in time.
         strays: answers to no question, among them those that came too late.
     """
@@ -277,18 +278,13 @@ class MagpieServos:
         self.lost = self.strays = 0
         self._connect = connect
         self._port: SerialPort | None = connect(config.port, BAUD)
-        self._parser = StatusParser()
+        self.parser = StatusParser()
         self._fingers = (_Finger(config.a), _Finger(config.b))
         self._asked: tuple[_Finger, int, float] | None = None
         self._turn = self._size = 0
         self._reported = self._retry = -math.inf
         self._started = math.nan
         self._gone = ""
-
-    @property
-    def skipped(self) -> int:
-        """Bytes that belonged to no sound packet."""
-        return self._parser.skipped
 
     def command(self, command: HandCommand) -> None:
         """Take what the hand is told, as far as it can do it. Raises ValueError: a number is not finite."""
@@ -341,12 +337,12 @@ class MagpieServos:
             if t < self._retry:
                 return
             self._port, self._gone, self._started = self._connect(self.config.port, BAUD), "", t
-        for packet in self._parser.feed(self._port.read()):
+        for packet in self.parser.feed(self._port.read()):
             self._answer(packet, t)
         if self._asked is not None and t - self._asked[2] > ANSWER:
             self.lost += 1
             self._asked = None
-            self._parser.clear()
+            self.parser.clear()
         if self._asked is None:
             self._ask(self._port, t)
 

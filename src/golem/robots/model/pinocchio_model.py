@@ -27,18 +27,10 @@ class Kinematics:
 
     def pose(self, frame: str) -> Array:
         """Return the (4, 4) pose of `frame` in base_link at the joints last set; at zero before."""
-        self._compute()
-        return pin.updateFramePlacement(self._model, self._data, self._ids[frame]).homogeneous
-
-    def com(self) -> Array:
-        """Return the (3,) centre of mass of the whole robot in base_link [m], hands empty; joints as for `pose`."""
-        self._compute()
-        return pin.centerOfMass(self._model, self._data, pin.POSITION, False).copy()
-
-    def _compute(self) -> None:
         if self._q is not None:
             pin.forwardKinematics(self._model, self._data, self._q)
             self._q = None
+        return pin.updateFramePlacement(self._model, self._data, self._ids[frame]).homogeneous
 
 
 _HINGES = (pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ)
