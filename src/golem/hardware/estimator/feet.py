@@ -173,12 +173,8 @@ FEET = np.dtype(
         ("planted", "i8", (2,)),
         ("age", "f8", (2,)),
         ("new", "i8"),
-        ("force", "f8", (2,)),
-        ("contact", "f8", (2,)),
-        ("weight", "f8", (2,)),
-        ("points", "f8", (2, 3)),
-        ("rates", "f8", (2, 3)),
-        ("local", "f8", (2, 3)),
+        *((name, "f8", (2,)) for name in ("force", "contact", "weight")),
+        *((name, "f8", (2, 3)) for name in ("points", "rates", "local")),
     ]
 )
 """Options, memory and answers of `sense_feet`, in the axes of base_link.

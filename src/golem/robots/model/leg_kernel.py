@@ -111,9 +111,7 @@ LEG_MOTION = np.dtype(
         ("soles", "f8", (2, 3)),
         ("rotations", "f8", (2, 3, 3)),
         ("jacobians", "f8", (2, LEG, LEG)),
-        ("twists", "f8", (2, LEG)),
-        ("momentum", "f8", (2, LEG)),
-        ("gravity", "f8", (2, LEG)),
+        *((name, "f8", (2, LEG)) for name in ("twists", "momentum", "gravity")),
     ]
 )
 """What `leg_motion` fills in; see `LegDynamics`, and `gravity`: torque that carries the legs' weight [N m]."""

@@ -133,13 +133,9 @@ RELEASE_TIME = 0.5
 
 HOIST = np.dtype(
     [
-        ("body", "i8"),
-        ("q", "i8"),
-        ("v", "i8"),
-        ("weight", "f8", (3,)),
-        ("home", "f8", (3,)),
-        ("k", "f8", (2, 3)),
-        ("d", "f8", (2, 3)),
+        *((name, "i8") for name in ("body", "q", "v")),
+        *((name, "f8", (3,)) for name in ("weight", "home")),
+        *((name, "f8", (2, 3)) for name in ("k", "d")),
         ("released_at", "f8"),
     ]
 )

@@ -27,15 +27,10 @@ _OFFSET = magpie_model.pad_offset(0.0) - magpie_model.ARM * math.cos(magpie_mode
 
 HAND = np.dtype(
     [
-        ("q", "i8", (2,)),
-        ("v", "i8", (2,)),
-        ("u", "i8", (2,)),
+        *((name, "i8", (2,)) for name in ("q", "v", "u")),
         ("sign", "f8", (2,)),
         ("commanded", "i8"),
-        ("gap", "f8"),
-        ("goal", "f8"),
-        ("force", "f8"),
-        ("reference", "f8"),
+        *((name, "f8") for name in ("gap", "goal", "force", "reference")),
     ]
 )
 """Indices, signs and memory of the servos of one hand; angles of the cranks are positive when closing [rad]."""
