@@ -127,7 +127,7 @@ class OpenWordsConfig:
 
     def __post_init__(self) -> None:
         require(
-            "the detector's ",
+            "detector's ",
             ("threshold", self.threshold, 0.0 < self.threshold < 1.0, "between 0 and 1"),
             ("overlap", self.overlap, 0.0 < self.overlap <= 1.0, "from 0 to 1"),
         )

@@ -197,5 +197,7 @@ def answer_problem(joint: int, moved: Array, by: float) -> str:
         other = f"; {JOINT_NAMES[most]} moved instead" if abs(moved[most]) > ANSWERS * SWING else ""
         return f"{JOINT_NAMES[joint]} was sent by {by:+.2f} rad and moved by {moved[joint]:+.3f}{other}"
     if most != joint:
-        return f"{JOINT_NAMES[joint]} was sent by {by:+.2f} rad, and {JOINT_NAMES[most]} moved further: {moved[most]:+.2f}"
+        return (
+            f"{JOINT_NAMES[joint]} was sent by {by:+.2f} rad, and {JOINT_NAMES[most]} moved further: {moved[most]:+.2f}"
+        )
     return ""
