@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from tests.hardware.estimator.sensed_feet import Feet
 
-from golem.hardware.estimator.attitude import sensed_rotation
+from golem.hardware.estimator.attitude import Attitude
 from golem.hardware.estimator.feet import FeetConfig
 from golem.robots.model.imu_mount import sensed_base_rate
 from golem.robots.model.leg_kernel import LegDynamics
@@ -20,7 +20,7 @@ DT = 0.002
 
 
 def sense(feet: Feet, state: LowState) -> None:
-    feet.step(state, sensed_rotation(state)[2], sensed_base_rate(state), DT)
+    feet.step(state, Attitude().rotation(state)[2], sensed_base_rate(state), DT)
 
 
 def test_the_torques_of_a_standing_robot_carry_its_weight(world: Callable[..., Any]) -> None:

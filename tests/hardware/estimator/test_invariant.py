@@ -8,7 +8,7 @@ from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
 from golem.hardware.estimator.invariant_ekf import InvariantConfig, InvariantFilter
-from golem.hardware.estimator.invariant_kernel import correct, exp_and_jacobian, predict, update
+from golem.hardware.estimator.invariant_kernel import correct, exp_and_jacobian
 from golem.robots.model.spatial import skew
 from golem.types import Array
 
@@ -21,9 +21,9 @@ STILL = np.zeros((2, 3))
 
 def stand(filter: InvariantFilter, steps: int, gyro: Array, acc: Array, points: Array = POINTS) -> None:
     for _ in range(steps):
-        predict(filter.memory[0], gyro, acc, BOTH, DT)
+        filter.predict(gyro, acc, BOTH, DT)
         heading = float(np.arctan2(filter.R[1, 0], filter.R[0, 0]))
-        update(filter.memory[0], points, BOTH, STILL, heading, hanging=False)
+        filter.update(points, BOTH, STILL, heading, hanging=False)
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-8, 1e-3, 1.0, 3.0])
@@ -45,7 +45,7 @@ def test_prediction_integrates_a_turn_on_a_circle() -> None:
     n = 1000
     for _ in range(n):
         # Turning left at constant speed: centripetal acceleration in the body's y.
-        predict(filter.memory[0], np.array([0.0, 0.0, rate]), UP + [0.0, rate * speed, 0.0], NEITHER, DT)
+        filter.predict(np.array([0.0, 0.0, rate]), UP + [0.0, rate * speed, 0.0], NEITHER, DT)
     angle, radius = rate * n * DT, speed / rate
     np.testing.assert_allclose(filter.R, Rotation.from_rotvec([0, 0, angle]).as_matrix(), atol=1e-9)
     expected = radius * np.array([np.sin(angle), 1.0 - np.cos(angle), 0.0])
@@ -69,8 +69,8 @@ def test_the_covariance_predicts_how_an_error_grows() -> None:
         one.memory[name] = 0.0
     gyro, acc = np.array([0.3, -0.2, 0.4]), UP + [0.5, 0.2, -0.3]
     for _ in range(100):
-        predict(one.memory[0], gyro, acc, BOTH, DT)
-        predict(other.memory[0], gyro, acc, BOTH, DT)
+        one.predict(gyro, acc, BOTH, DT)
+        other.predict(gyro, acc, BOTH, DT)
     turn = Rotation.from_matrix(other.R @ one.R.T).as_rotvec()
     moved = other.x - one.x @ exp_and_jacobian(turn)[0].T
     grown = np.concatenate([turn, moved.ravel(), (other.bias - one.bias).ravel()])
@@ -98,8 +98,8 @@ def test_a_foot_that_jumps_is_put_where_it_is_and_moves_nothing() -> None:
     stand(filter, 500, np.zeros(3), UP)
     before = filter.x.copy()
     jumped = POINTS + [[0.0, 0.0, 0.0], [0.1, 0.05, 0.0]]
-    predict(filter.memory[0], np.zeros(3), UP, BOTH, DT)
-    believed = update(filter.memory[0], jumped, BOTH, STILL, 0.0, hanging=False)
+    filter.predict(np.zeros(3), UP, BOTH, DT)
+    believed = filter.update(jumped, BOTH, STILL, 0.0, hanging=False)
     assert believed.tolist() == [True, False]
     stand(filter, 100, np.zeros(3), UP, jumped)
     np.testing.assert_allclose(filter.x[:2], before[:2], atol=2e-3)
@@ -111,10 +111,10 @@ def test_a_contact_point_that_moves_within_the_sole_moves_nothing() -> None:
     stand(filter, 500, np.zeros(3), UP)
     before = filter.x[:2].copy()
     for i in range(50):
-        predict(filter.memory[0], np.zeros(3), UP, BOTH, DT)
+        filter.predict(np.zeros(3), UP, BOTH, DT)
         shift = np.array([[0.002, 0.0, 0.0], [0.0, 0.0, 0.0]])
         moved = POINTS + (i + 1) * shift
-        assert update(filter.memory[0], moved, BOTH, shift, 0.0, hanging=False).all()
+        assert filter.update(moved, BOTH, shift, 0.0, hanging=False).all()
     np.testing.assert_allclose(filter.x[:2], before, atol=2e-3)
 
 
@@ -122,7 +122,7 @@ def test_the_covariance_stays_symmetric_and_positive() -> None:
     filter, rng = InvariantFilter(InvariantConfig()), np.random.default_rng(0)
     for i in range(2000):
         weight = np.array([float(i % 400 < 250), float((i + 200) % 400 < 250)])
-        predict(filter.memory[0], 0.3 * rng.standard_normal(3), UP + rng.standard_normal(3), weight, DT)
-        update(filter.memory[0], POINTS + 0.003 * rng.standard_normal((2, 3)), weight, STILL, 0.0, hanging=False)
+        filter.predict(0.3 * rng.standard_normal(3), UP + rng.standard_normal(3), weight, DT)
+        filter.update(POINTS + 0.003 * rng.standard_normal((2, 3)), weight, STILL, 0.0, hanging=False)
     np.testing.assert_array_equal(filter.P, filter.P.T)
     assert np.linalg.eigvalsh(filter.P).min() > -1e-12

@@ -36,11 +36,23 @@ def base_rotation(quat: Array, torso: float, heading: float, out: Array) -> None
     out[2, 0], out[2, 1], out[2, 2] = k * (x * z - w * y), k * (y * z + w * x), 1.0 - k * (x * x + y * y)
 
 
-def sensed_rotation(state: LowState, heading: float = 0.0) -> Array:
-    """Return the (3, 3) rotation of base_link in odom, which has the `heading` in the IMU's world [rad]."""
-    R = np.empty((3, 3))
-    base_rotation(state.imu.quat, float(state.q[TORSO]), heading, R)
-    return R
+class Attitude:
+    """The orientation of base_link in odom, which has the `heading` in the IMU's world [rad] of the reset."""
+
+    def __init__(self) -> None:
+        self.heading = 0.0
+
+    def reset(self, state: LowState) -> None:
+        """Take the present heading of base_link as zero."""
+        self.heading = 0.0
+        R = self.rotation(state)
+        self.heading = math.atan2(R[1, 0], R[0, 0])
+
+    def rotation(self, state: LowState) -> Array:
+        """Return the (3, 3) rotation of base_link in odom: the IMU's, less the torso joint's."""
+        R = np.empty((3, 3))
+        base_rotation(state.imu.quat, float(state.q[TORSO]), self.heading, R)
+        return R
 
 
 GYRO_BIAS = np.dtype([("value", "f8", (3,)), ("before", "f8", (4,)), ("has_before", "i8"), ("elapsed", "f8")])

@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from golem.finite import finite_state
-from golem.hardware.estimator.attitude import base_rotation, sensed_rotation
+from golem.hardware.estimator.attitude import Attitude, base_rotation
 from golem.hardware.estimator.compiled import CompiledEstimator
-from golem.hardware.estimator.feet import FEET, FLOOR, FeetConfig, level_floor, put_feet, sense_feet
+from golem.hardware.estimator.feet import FEET, FLOOR, FeetConfig, forget_feet, level_floor, put_feet, sense_feet
 from golem.hardware.estimator.feet_kernel import in_torso
 from golem.hardware.estimator.invariant_kernel import SIZE, predict, update
 from golem.kernels import njit
@@ -134,6 +134,30 @@ class InvariantFilter:
         lever = np.eye(SIZE)
         lever[_P, _ROTATION] = skew(p)
         self.P[:] = lever @ np.diag(spread**2) @ lever.T
+
+    def predict(self, gyro: Array, acc: Array, weight: Array, dt: float) -> None:
+        """Advance by one IMU sample.
+
+        Args:
+            gyro: (3,) measured angular rate [rad/s].
+            acc: (3,) measured specific force [m/s^2].
+            weight: (2,) how far each foot is to be believed to stand still.
+            dt: time since the previous sample [s].
+        """
+        predict(self.memory[0], gyro, acc, weight, dt)
+
+    def update(self, points: Array, weight: Array, shift: Array, heading: float, hanging: bool) -> NDArray[np.bool_]:
+        """Fuse where the feet are seen, and the heading; return (2,) which feet were believed.
+
+        Args:
+            points: (2, 3) contact points, in the IMU's frame [m].
+            weight: (2,) how far each foot is to be believed to stand still.
+            shift: (2, 3) by how much the contact points have moved within the soles since the last call, axes of the
+                IMU [m].
+            heading: by how much the estimated heading exceeds the IMU's own [rad].
+            hanging: whether to take the robot as being at rest.
+        """
+        return update(self.memory[0], points, weight, shift, heading, hanging)
 
 
 _IMU = tuple(FRAMES["imu_link"].T_parent_frame[:3, 3].tolist())
@@ -267,15 +291,19 @@ class InvariantEKF(CompiledEstimator):
 
     def __init__(self, config: InvariantEKFConfig | None = None) -> None:
         self.config = config or InvariantEKFConfig()
-        memory = new_record(INVARIANT_EKF)
+        super().__init__(CompiledStage(_code(), new_record(INVARIANT_EKF)))
+        memory = self.stage.memory
         put_feet(memory["feet"], self.config.feet)
         memory["stale_after"] = self.config.stale_after
         self._filter = InvariantFilter(self.config.filter, memory["filter"])
-        super().__init__(CompiledStage(_code(), memory))
 
     def reset(self, state: LowState) -> None:
         """Start at rest above the origin of odom, heading zero."""
-        super().reset(state)
-        heading = float(self.stage.memory["heading"][0])
-        R = sensed_rotation(state, heading) @ waist_rotation(float(state.q[TORSO]))
+        attitude, memory = Attitude(), self.stage.memory
+        attitude.reset(state)
+        memory["heading"] = attitude.heading
+        forget_feet(memory["feet"])
+        R = attitude.rotation(state) @ waist_rotation(float(state.q[TORSO]))
         self._filter.reset(R, R @ _IMU)
+        memory["local"], memory["floor"] = 0.0, np.zeros(1, FLOOR)
+        memory["grounded"], memory["unmeasured"] = 0, 0.0

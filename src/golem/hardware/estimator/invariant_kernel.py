@@ -45,14 +45,7 @@ def _series(x: float, y: float, z: float, square: float, a: float, b: float) -> 
 
 @njit(cache=True, nogil=True)
 def predict(m: Record, gyro: Array, acc: Array, weight: Array, dt: float) -> None:
-    """Advance the `INVARIANT` `m` by one IMU sample.
-
-    Args:
-        gyro: (3,) measured angular rate [rad/s].
-        acc: (3,) measured specific force [m/s^2].
-        weight: (2,) how far each foot is to be believed to stand still.
-        dt: time since the previous sample [s].
-    """
+    """Advance the `INVARIANT` `m` by one IMU sample; see `InvariantFilter.predict`."""
     R, x, bias, P = m.R, m.x, m.bias, m.P
     contact = np.empty(2)
     for k in range(2):
@@ -140,16 +133,7 @@ def correct(R: Array, x: Array, bias: Array, delta: Array) -> None:
 
 @njit(cache=True, nogil=True)
 def update(m: Record, points: Array, weight: Array, shift: Array, heading: float, hanging: bool) -> NDArray[np.bool_]:
-    """Fuse where the feet are seen, and the heading, into the `INVARIANT` `m`; return (2,) which feet were believed.
-
-    Args:
-        points: (2, 3) contact points, in the IMU's frame [m].
-        weight: (2,) how far each foot is to be believed to stand still.
-        shift: (2, 3) by how much the contact points have moved within the soles since the last call, axes of the
-            IMU [m].
-        heading: by how much the estimated heading exceeds the IMU's own [rad].
-        hanging: whether to take the robot as being at rest.
-    """
+    """Fuse where the feet are seen, and the heading, into the `INVARIANT` `m`; see `InvariantFilter.update`."""
     R, x, P, planted, config = m.R, m.x, m.P, m.planted, m.numbers
     least, foot, course, rest = config[0], config[1], config[2], config[3]
     gate, reject = config[4], config[5]

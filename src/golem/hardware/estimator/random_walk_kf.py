@@ -18,13 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from golem.finite import finite_state
-from golem.hardware.estimator.attitude import GYRO_BIAS, base_rotation, track_bias
+from golem.hardware.estimator.attitude import GYRO_BIAS, Attitude, base_rotation, track_bias
 from golem.hardware.estimator.compiled import CompiledEstimator
-from golem.hardware.estimator.feet import FEET, FLOOR, FeetConfig, level_floor, put_feet, sense_feet
+from golem.hardware.estimator.feet import FEET, FLOOR, FeetConfig, forget_feet, level_floor, put_feet, sense_feet
 from golem.kernels import njit
 from golem.native import ORDINARY, UNUSUAL, CompiledStage, Record, Records, new_record, shared, stage_code, view
 from golem.robots.model.imu_mount import TORSO, turn_to_base
-from golem.types import Array
+from golem.types import Array, LowState
 
 
 @dataclass(frozen=True, slots=True)
@@ -220,9 +220,25 @@ class RandomWalkKF(CompiledEstimator):
 
     def __init__(self, config: RandomWalkKFConfig | None = None) -> None:
         self.config = config or RandomWalkKFConfig()
-        memory = new_record(RANDOM_WALK)
+        super().__init__(CompiledStage(_code(), new_record(RANDOM_WALK)))
+        memory = self.stage.memory
         put_feet(memory["feet"], self.config.feet)
         memory["filter"]["options"] = filter_options(self.config.filter)
-        memory["filter"]["variance"] = self.config.filter.start**2
         memory["stale_after"] = self.config.stale_after
-        super().__init__(CompiledStage(_code(), memory))
+        self._rest()
+
+    def reset(self, state: LowState) -> None:
+        """Start at rest above the origin of odom, heading zero."""
+        self._rest()
+        attitude = Attitude()
+        attitude.reset(state)
+        self.stage.memory["heading"] = attitude.heading
+
+    def _rest(self) -> None:
+        memory = self.stage.memory
+        memory["bias"] = np.zeros(1, GYRO_BIAS)
+        forget_feet(memory["feet"])
+        memory["filter"]["velocity"], memory["filter"]["unmeasured"] = 0.0, 0.0
+        memory["filter"]["variance"] = self.config.filter.start**2
+        memory["xy"] = 0.0
+        memory["floor"] = np.zeros(1, FLOOR)

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from golem.finite import finite_state
-from golem.hardware.estimator.attitude import base_rotation
+from golem.hardware.estimator.attitude import Attitude, base_rotation
 from golem.hardware.estimator.compiled import CompiledEstimator
 from golem.kernels import njit
 from golem.native import ORDINARY, UNUSUAL, CompiledStage, Record, new_record, shared, stage_code, view
 from golem.robots.model.imu_mount import TORSO
+from golem.types import LowState
 
 TETHER = np.dtype([("heading", "f8")])
 """Memory of the estimator."""
@@ -43,3 +44,9 @@ class TetherEstimator(CompiledEstimator):
 
     def __init__(self) -> None:
         super().__init__(CompiledStage(_code(), new_record(TETHER)))
+
+    def reset(self, state: LowState) -> None:
+        """Take the present heading of base_link as zero."""
+        attitude = Attitude()
+        attitude.reset(state)
+        self.stage.memory["heading"] = attitude.heading
