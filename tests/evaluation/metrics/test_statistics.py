@@ -143,6 +143,17 @@ def test_a_share_of_yes_and_no_has_wilsons_interval() -> None:
     assert mean_interval([1.0, 0.0, 1.0], 0.0, 1.0) == wilson(2, 3)
 
 
+def test_the_mean_of_shares_is_quoted_with_an_interval_that_holds_it() -> None:
+    rng, held = np.random.default_rng(0), 0
+    for _ in range(100):
+        found = distribution(rng.beta(2.0, 3.0, 64).round(2).tolist(), 0.0, 1.0)
+        assert found is not None and found.mean_interval is not None
+        assert found.mean_interval.low <= found.mean <= found.mean_interval.high
+        assert found.mean_interval.high - found.mean_interval.low < 0.2
+        held += found.mean_interval.low <= 0.4 <= found.mean_interval.high
+    assert held >= 94
+
+
 def test_other_shares_have_an_interval_that_assumes_no_distribution() -> None:
     assert mean_interval([0.5, 0.5], 0.0, 1.0) == Interval(0.0, 1.0), "two values say nothing"
     found = mean_interval([0.5, 1.0, 1.0, 0.9] * 10, 0.0, 1.0)

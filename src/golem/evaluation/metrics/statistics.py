@@ -148,7 +148,7 @@ def distribution(values: Sequence[float], low: float = -math.inf, high: float = 
     return Distribution(
         n=len(x),
         mean=float(x.mean()),
-        mean_interval=mean_interval(x.tolist(), low, high),
+        mean_interval=mean_interval(values, low, high),  # bets on each value by those before: never in order of size
         median=median,
         median_interval=_median_interval(x.tolist()),
         q1=q1,
