@@ -154,10 +154,14 @@ class JobFile(SqliteFile):
         self.loosened = {name for (name,) in self._base.execute("SELECT name FROM loosened")}
 
     def loosen(self, name: str) -> None:
-        """Keep, for good, that a gantry is done with a fastener. Raises JobFault: the disk is full or not writable."""
-        with self._faults():
-            self._base.execute("INSERT OR IGNORE INTO loosened VALUES (?)", (name,))
+        """Note that a gantry is done with a fastener; `keep_loosened`, and the next `tell`, keep that for good."""
         self.loosened.add(name)
+
+    def keep_loosened(self) -> None:
+        """Write what a gantry is done with. Raises JobFault: the disk is full or cannot be written."""
+        with self._faults():
+            rows = [(name,) for name in list(self.loosened)]
+            self._base.executemany("INSERT OR IGNORE INTO loosened VALUES (?)", rows)
 
     def tell(
         self,
@@ -174,6 +178,7 @@ class JobFile(SqliteFile):
 
         Raises JobFault: the disk is full or cannot be written.
         """
+        self.keep_loosened()
         pose = (None,) * 3 if stance is None else (stance.x, stance.y, stance.yaw)
         names = "number, fate, reason, side, tray, x, y, yaw, t, picture"
         values = (one.number, fate.value, reason, side, tray, *pose, t, picture)

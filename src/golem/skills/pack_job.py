@@ -171,8 +171,8 @@ class PackJob:
         for label in set(KINDS.values()):
             places = [(c.x, c.y, c.z) for c in self._trays(label)]
             containers |= {label: np.array(places)} if places else {}
-        at = self._gantry_at()
-        away = None if at is None else (at, KEEP_OFF)
+        away = None if (at := self._gantry_at()) is None else (at, KEEP_OFF)
+        await self._context.think(self._book.keep_loosened, 0.0)  # live, another thread waits for the disk
         args = self._sides, todo, containers, self._T_pack_base, self._rims, away
         plan = await self._context.think(lambda: make_plan(*args), PLANNING)
         served, walk = sum(len(stop.picks) for stop in plan), sum(stop.way for stop in plan)
