@@ -6,9 +6,9 @@ from pathlib import Path
 
 from tests.sources import SOURCE
 
-ALL = 101_930
+ALL = 101_928
 """Lines of the package [own: 100,000 is the goal; lower this with every line that goes]."""
-ON_A_ROBOT = 62_687
+ON_A_ROBOT = 62_685
 """Lines of what a robot runs [own: 62,000 is the goal]."""
 NOT_ON_A_ROBOT = ("evaluation", "training", "dashboard", "demo.py", "demo_pack.py", "demo_walk.py", "run.py")
 ENGINES = ("mujoco", "physx", "isaaclab", "replay", "worlds")

@@ -158,9 +158,9 @@ def test_a_file_says_what_one_robot_is_like(tmp_path: Path) -> None:
         ("base: field\nzeros: {left_elbow_joint: [1]}", "left_elbow_joint is a number from -0.5"),
         ("base: field\nmotors: {torque_gains: {elbow: 0.1}}", "'elbow'; valid: "),
         ("base: field\nzeros: 3", "mappings by joint, not 3"),
-        ("base: field\nbacklash: -0.01", "backlash is -0.01; it is 0 or more"),
-        ("base: field\narm_friction: [-1.0, 2.0]", "arm_friction is from -1 to 2; it is a range"),
-        ("base: field\nleg_friction: [3.0, 2.0]", "leg_friction is from 3 to 2; it is a range"),
+        ("base: field\nbacklash: -0.01", "backlash is 0 or more, not -0.01"),
+        ("base: field\narm_friction: [-1.0, 2.0]", "arm_friction's lower end is 0 or more, not -1"),
+        ("base: field\nleg_friction: [3.0, 2.0]", "leg_friction's width is 0 or more, not -1"),
         ("base: field\nhead: {min_error: 5}", "'head'; valid: "),
     ],
 )

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from golem.errors import ConfigError, unknown_name
-from golem.options import check_values, convert_all, fill, read_yaml
+from golem.options import check_values, convert_all, fill, read_yaml, require
 from golem.package_data import load_data
 from golem.robots.model.spatial import transform
 from golem.robots.model.table import JOINT_INDEX
@@ -222,13 +222,11 @@ def load_profile(name: str) -> RealismProfile:
     profile = replace(base, **convert_all(f"key of {name}", RealismProfile, rows, others))
     for values in (profile.zeros, profile.motors.torque_gains):
         per_joint(values)
-    for key in ("arm_offset", "leg_offset", "actuator_delay", "backlash"):
-        if getattr(profile, key) < 0.0:
-            raise ConfigError(f"{name}: {key} is {getattr(profile, key):g}; it is 0 or more.")
+    least = {key: getattr(profile, key) for key in ("arm_offset", "leg_offset", "actuator_delay", "backlash")}
     for key in ("leg_friction", "arm_friction"):
         low, high = getattr(profile, key) or (0.0, 0.0)
-        if not 0.0 <= low <= high:
-            raise ConfigError(f"{name}: {key} is from {low:g} to {high:g}; it is a range from 0 or more upward.")
+        least |= {f"{key}'s lower end": low, f"{key}'s width": high - low}
+    require(f"profile {name}: ", *((what, value, value >= 0.0, "0 or more") for what, value in least.items()))
     return profile
 
 
